@@ -21,7 +21,7 @@ from vftcli.signals.remarks import caution
         ({"evidence": 49.0}, "weak"),
         ({"peak_band": 0.3 * 64.8}, "fair"),
         ({"peak_band": 0.5 * 64.8}, "weak"),
-        ({"remarks": (caution("free-part-rests"),)}, "weak"),
+        ({"remarks": (caution("size-in-doubt"),)}, "weak"),
         ({"is_load": True}, "weak"),
         ({"peak_force": None}, "weak"),
         ({"inferred": True}, "fair"),
@@ -89,7 +89,7 @@ def test_a_pose_that_is_blind_along_an_axis_tells_no_least_force(least, told):
 
 
 def test_a_row_of_a_table_has_a_column_for_each_number():
-    remark = caution("free-part-rests", least_N=12.0)
+    remark = caution("size-goes-with-place", least_N=12.0, most_N=20.0)
     row = contact(remarks=(remark,)).row()
     assert [row[f"force_N_{axis}"] for axis in "xyz"] == [0.4, 51.9, -38.8]
     assert [row[f"moment_sd_Nm_{axis}"] for axis in "xyz"] == [0.5, 0.5, 0.5]

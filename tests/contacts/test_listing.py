@@ -20,6 +20,7 @@ from vftcli.free_motion import FreeChoice
 from vftcli.free_motion.free_motion import FreeMotion
 from vftcli.readers.reading import read
 from vftcli.robots import Robot, load_robot
+from vftcli.robots.chain import flange_jacobian
 from vftcli.robots.kernels import load_regressor
 from vftcli.robots.run import Run
 from vftcli.signals.arrays import Array
@@ -349,6 +350,50 @@ def test_a_press_on_a_resting_arm_is_one_contact_and_no_load(logs, name):
     assert not row.is_load
 
 
+def free_with_pushes(logs: Path, force: float) -> Recording:
+    """40 s of real free motion with six pushes of a force [N], .6 s each, along base axes."""
+    log, robot = ur10e(logs, "free_12harm_40s.csv.gz"), load_robot("ur10e")
+    J = flange_jacobian(robot.chain, log.require("q"))
+    torque = np.zeros_like(log.require("q"))
+    for k in range(6):
+        pushed = abs(log.t - PUSHED[k]) < 0.3
+        torque[pushed] = (-1.0) ** k * force * J[pushed, k % 3]
+    return replace(log, current=log.require("current") - torque / robot.torque_constant)
+
+
+PUSHED = 4.0, 10.0, 16.0, 22.0, 28.0, 34.0
+"""When each of the pushes is in its middle. [s]"""
+
+
+@pytest.mark.slow
+def test_pushes_above_the_stated_force_are_listed_and_weak_ones_are_not(logs):
+    """Without named free motion the limit of evidence counts, not the noise alone."""
+    least = list_contacts(motion(free_with_pushes(logs, 0.0), "ur10e")).smallest_force
+    assert 15.0 < least < 60.0
+    # Half as hard a push may show or not.
+    for share, fewest, most in ((0.2, 0, 0), (1.3, 5, 6)):
+        found = list_contacts(motion(free_with_pushes(logs, share * least), "ur10e")).contacts
+        met = [any(row.start < at < row.stop for row in found) for at in PUSHED]
+        assert fewest <= sum(met) <= most
+        assert len(found) == sum(met)
+
+
+@pytest.mark.slow
+def test_free_motion_at_rest_tells_no_friction_of_a_moving_arm(logs):
+    """The arm rests as long as it then moves; nobody touches it. It gave four contacts of 22 N
+    and "nothing else above .6 N"."""
+    log = ur10e(logs, "free_14harm.csv")
+    rows = np.r_[np.zeros(log.samples, int), np.arange(log.samples)]
+    signals = {name: np.array(log.require(name)[rows]) for name in ("q", "dq", "current")}
+    signals["dq"][: log.samples] = 0.0
+    noise = np.random.default_rng(0).standard_normal((log.samples, 6))
+    signals["current"][: log.samples] += 0.05 * noise
+    long = Recording(t=np.arange(len(rows)) * log.median_step, **signals)
+    found = list_contacts(motion(long, "ur10e", "1:39"))
+    assert len(found) <= 1
+    assert found.smallest_force > 20.0
+
+
 @pytest.mark.slow
 def test_an_arm_whose_friction_is_unknown_lists_pushes_and_nothing_below_what_shows(logs):
     """Three pushes of 15 to 25 N by a joint friction of 1.1 N·m that `fr3` does not have."""
@@ -523,4 +568,6 @@ def test_an_arm_rests_around_a_contact_from_3_to_4_s(start, stop, speed, rests):
     nothing = np.zeros((300, 2))
     found = SimpleNamespace(log=SimpleNamespace(blocks=blocks(nothing, nothing)))
     span = round(3.0 / B), round(4.0 / B)
-    assert rests_around(run, found, span) is rests
+    assert rests_around(run, found, span, np.array([True, True])) is rests
+    # Of a joint that free motion knows nobody asks.
+    assert rests_around(run, found, span, np.array([True, False]))

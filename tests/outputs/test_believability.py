@@ -109,7 +109,7 @@ OF_VENDOR = listed(contact(vendor_force=61.2), contact(vendor_force=None))
         ({"finding": COLD}, "temperature", "caution", "", ""),
         (listed(contact()), "free motion", "good", "0 contacts listed in its 4 s", ""),
         (listed(false_on_free=1), "free motion", "caution", "1 contact listed in its 4 s", ""),
-        (listed(basis="friction", free=()), "free motion", "caution", "none is given: pushes",
+        (listed(basis="friction", free=()), "free motion", "caution", "none is given: sizes",
          "--free free.csv"),
         (listed(basis="none", free=()), "free motion", "unknown", "no contact is listed",
          "--free free.csv"),

@@ -100,8 +100,8 @@ class Contact(Shown):
     remarks: tuple[Remark, ...] = ()  #: Limits of this row.
 
     def __post_init__(self) -> None:
-        seal(self, "wrench", "wrench_sd", "mean_force", "impulse")
-        seal(self, "joint_torque", "joint_torque_sd")
+        torques = "joint_torque", "joint_torque_sd"
+        seal(self, "wrench", "wrench_sd", "mean_force", "impulse", *torques)
 
     def _headline(self) -> str:
         kind = "load" if self.is_load else "contact"
@@ -185,8 +185,8 @@ class Contact(Shown):
 
 def numbered(rows: Sequence[Contact], *, inferred: bool) -> tuple[Contact, ...]:
     """The rows in the order of time with their numbers, from 1."""
-    ordered = sorted(rows, key=lambda row: row.start)
-    return tuple(replace(row, number=k, inferred=inferred) for k, row in enumerate(ordered, 1))
+    ordered = enumerate(sorted(rows, key=lambda row: row.start), 1)
+    return tuple(replace(row, number=k, inferred=inferred) for k, row in ordered)
 
 
 class CarriedLoad(NamedTuple):
@@ -205,21 +205,15 @@ class CarriedLoad(NamedTuple):
         """A log's load, with the payload of the robot's file that weighs as much."""
         moves = run.t[faster(run.dq).any(axis=1)]
         ends = moves if len(moves) else run.t
-        apart = {name: abs(p.mass - load.mass) for name, p in run.robot.payloads.items()}
-        name = min(apart, key=lambda key: apart[key], default=None)
-        alike = name is not None and apart[name] <= max(2.0 * load.sd, SAME_MASS * load.mass)
-        span = ends[0], ends[-1]
-        return cls(load.mass, load.sd, run.robot.name, name if alike else None, span)
+        apart = [(abs(p.mass - load.mass), name) for name, p in run.robot.payloads.items()]
+        off, name = min(apart, default=(np.inf, None))
+        alike = name if off <= max(2.0 * load.sd, SAME_MASS * load.mass) else None
+        return cls(load.mass, load.sd, run.robot.name, alike, (ends[0], ends[-1]))
 
     def record(self) -> dict[str, Any]:
         """The load for machines, units in the names."""
-        return {
-            "mass_kg": self.mass,
-            "mass_sd_kg": self.sd,
-            "robot": self.robot,
-            "payload": self.payload,
-            "span_s": list(self.span),
-        }
+        keys = "mass_kg", "mass_sd_kg", "robot", "payload", "span_s"
+        return dict(zip(keys, self, strict=True))
 
 
 class Unexplained(NamedTuple):
@@ -282,12 +276,9 @@ class ContactList(Shown):
         return True
 
     def _headline(self) -> str:
-        count, hardest = len(self), self.hardest
-        listed = counted(count, "contact")
-        every = f"of {self.recording}: {listed} in {self.duration:.4g} s"
-        if hardest is None:
-            return every
-        return f"{every}, the hardest {hardest._size} at {hardest.peak:.2f} s"
+        listed, hardest = counted(len(self), "contact"), self.hardest
+        last = f", the hardest {hardest._size} at {hardest.peak:.2f} s" if hardest else ""
+        return f"of {self.recording}: {listed} in {self.duration:.4g} s{last}"
 
     def _rows(self) -> Iterator[Sequence[object]]:
         yield "#", "from – to [s]", "|F| at its peak", "force x y z [N]", "where", "trust"
@@ -327,8 +318,10 @@ class ContactList(Shown):
     def without_forces(self) -> "ContactList":
         """The list of an arm with too few joints for a wrench: times, joint torques."""
         nothing: dict[str, Any] = dict.fromkeys(OF_FORCES)
-        both = (self.contacts, self.candidates)
-        rows, weak = (tuple(replace(row, **nothing) for row in part) for part in both)
+        rows, weak = (
+            tuple(replace(row, **nothing) for row in part)
+            for part in (self.contacts, self.candidates)
+        )
         remarks = (*self.remarks, caution("no-wrench-of-few-joints"))
         return replace(self, contacts=rows, candidates=weak, smallest_force=None, remarks=remarks)
 

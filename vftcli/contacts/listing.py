@@ -19,6 +19,8 @@ from vftcli.contacts.contact_list import (
     numbered,
 )
 from vftcli.contacts.free_statistics import (
+    MOST_PSEUDO,
+    PSEUDO,
     SETTLED,
     FreeStatistics,
     free_part,
@@ -35,17 +37,22 @@ from vftcli.contacts.rows import (
     shows_force,
 )
 from vftcli.contacts.search import Candidates, search
-from vftcli.contacts.windows import LEAST_EVIDENCE, LEAST_IN_MOTION, places, times_of
+from vftcli.contacts.windows import (
+    LEAST_EVIDENCE,
+    LEAST_IN_MOTION,
+    MARGIN,
+    places,
+)
 from vftcli.free_motion.free_motion import FreeMotion
 from vftcli.robots.chain import flange_jacobian
 from vftcli.robots.run import Run
-from vftcli.signals.arrays import Z_95, Array, covered
+from vftcli.signals.arrays import Array, Mask, covered
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.progress import passed
 from vftcli.signals.recording import Recording
-from vftcli.signals.remarks import Remark, Where, caution
+from vftcli.signals.remarks import Where, caution, on_joints
 from vftcli.signals.rest import MOVES, REST, faster
-from vftcli.wrench.model_error import UNSEEN_SHARE, error_process
+from vftcli.wrench.model_error import ErrorProcess, error_process, innovations
 from vftcli.wrench.smoother import (
     DRIVES,
     BlockLog,
@@ -77,7 +84,9 @@ def list_contacts(
     if free is None:
         return without_list(log)
     passed(0.5)
-    found = by_smoother(free, proven=referenced or free.basis == "free motion")
+    # A rest that nobody named may be a steady push.
+    known = free.basis == "free motion" and (motion.choice.is_given or free.noise.seen.any())
+    found = by_smoother(free, proven=bool(referenced or known))
     if log.robot.joints < 6:
         return found.without_forces()
     if is_load(log.recording, found.contacts) and (row := load_row(motion, found.contacts)):
@@ -113,19 +122,19 @@ def by_smoother(free: FreeStatistics, *, proven: bool) -> ContactList:
     run, named, seconds = free.log, free.basis == "free motion", free.seconds
     found = search(run, free.noise, free.level, seconds)
     t = found.log.blocks.t
-    middle = [np.mean(t[slice(*span)]) for span in found.runs]
+    middle = [span.mean() for span in found.spans]
     own = found.best[free.own[np.searchsorted(run.t, middle)]]
     least = max(LEAST_EVIDENCE, FALSE_MARGIN * own.max(initial=-np.inf))
-    first, last = t[0] + AT_ENDS, t[-1] - AT_ENDS
-    found = found.kept(
-        [k for k, (a, b) in enumerate(found.runs) if t[b - 1] >= first and t[a] <= last]
-    )
-    at_rest = np.array([rests_around(run, found, span) for span in found.runs], bool)
-    listed = found.best > np.where(at_rest | named, least, LEAST_IN_MOTION)
+    inner = (t >= t[0] + AT_ENDS) & (t <= t[-1] - AT_ENDS)
+    found = found.kept([k for k, (a, b) in enumerate(found.runs) if inner[a:b].any()])
+    spans = found.spans
+    # Free motion tells friction of the joints that it moves.
+    untold = ~free.noise.seen if named else np.ones_like(free.noise.seen)
+    at_rest = np.array([rests_around(run, found, span, untold) for span in found.runs], bool)
+    listed = found.best > np.where(at_rest, least, LEAST_IN_MOTION)
     if not named:
         listed |= at_rest & np.array(found.beyond, bool)
     seen = np.flatnonzero(listed | (found.best > LEAST_EVIDENCE)).tolist()
-    spans = {k: times_of(found.log.blocks, found.runs[k]) for k in seen}
     halted = [k for k in seen if follows_stop(run.recording, spans[k], seconds)]
     stops = tuple(t[found.runs[k][0]] for k in halted if listed[k])
     going = [k for k in seen if k not in halted]
@@ -137,9 +146,7 @@ def by_smoother(free: FreeStatistics, *, proven: bool) -> ContactList:
     if len(groups) < len(rows):
         measurement = ContactMeasurement.of(measurement.found.joined(groups), free)
         rows = measured_rows(free, measurement)
-    smallest = measurement.test.smallest_force
-    if not np.isfinite(smallest) and not named and run.robot.joints >= 6:
-        smallest = felt_by(run, free.level)
+    smallest = listed_force(free, found, least, untold)
     shown = np.array([shows_force(row, smallest) for row in rows], bool)
     if not named and shown.any():
         rows = measured_rows(free, replace(measurement, tail=TAIL))
@@ -147,8 +154,10 @@ def by_smoother(free: FreeStatistics, *, proven: bool) -> ContactList:
     contacts, weak = ([rows[k] for k in np.flatnonzero(some)] for some in (shown, ~shown))
     if others:
         beside = ContactMeasurement.of(found.kept(others), free, measurement)
-        weak = [*measured_rows(free, beside), *weak]
-    false = int(np.count_nonzero(own > LEAST_EVIDENCE))
+        weak += measured_rows(free, beside)
+    remarks = [caution("arm-stopped-abruptly", Where(span=(at, at)), at_s=at) for at in stops]
+    if not free.noise.seen.all():
+        remarks.append(caution("free-part-misses-joints", on_joints(~free.noise.seen)))
     return ContactList(
         recording=run.name,
         duration=run.recording.duration,
@@ -157,7 +166,7 @@ def by_smoother(free: FreeStatistics, *, proven: bool) -> ContactList:
         basis=free.basis,
         free=free.remarks,
         free_seconds=free.noise.free_seconds,
-        false_on_free=false + false_rows(free) if named else None,
+        false_on_free=int((own > LEAST_EVIDENCE).sum()) + false_rows(free) if named else None,
         threshold=least if named else LEAST_IN_MOTION,
         smallest_force=smallest,
         load=None if free.load is None else CarriedLoad.of(free.load, run),
@@ -169,7 +178,7 @@ def by_smoother(free: FreeStatistics, *, proven: bool) -> ContactList:
             error_time=free.noise.time,
             block=seconds,
         ),
-        remarks=tuple(limits(run, free, stops, smallest)),
+        remarks=tuple(remarks),
     )
 
 
@@ -194,8 +203,7 @@ def measured_rows(free: FreeStatistics, measurement: ContactMeasurement) -> list
     if not brief or free.fine is None:
         return rows
     fine, blocks = free.fine
-    ends = [times_of(found.log.blocks, run) for run in found.runs]
-    spans = [(a, b) for a, b in blocks.t.searchsorted(ends).tolist()]
+    spans = [(a, b) for a, b in blocks.t.searchsorted(found.spans).tolist()]
     others = [span for k, span in enumerate(spans) if k not in brief]
     process = error_process(fine.noise, blocks).hiding(covered(others, len(blocks.t), 1))
     some = found.kept(brief)._replace(
@@ -211,51 +219,52 @@ def measured_rows(free: FreeStatistics, measurement: ContactMeasurement) -> list
     return rows
 
 
-def rests_around(run: Run, found: Candidates, span: BlockSpan) -> bool:
-    """Whether the arm rests during a candidate, and for `AROUND` before and after it."""
+def rests_around(run: Run, found: Candidates, span: BlockSpan, joints: Mask) -> bool:
+    """Whether joints (n,) rest during a candidate, and for `AROUND` before and after it."""
     t = found.log.blocks.t
     first, last = run.t.searchsorted([t[span[0]] - AROUND, t[span[1] - 1] + AROUND])
-    speed = abs(run.dq[first:last])
-    return bool(len(speed) and np.quantile(speed, 0.95, axis=0).max() < MOVES)
+    speed = abs(run.dq[first:last, joints])
+    return bool(len(speed) and np.quantile(speed, 0.95, axis=0).max(initial=0.0) < MOVES)
+
+
+def listed_force(free: FreeStatistics, found: Candidates, least: float, untold: Mask) -> float:
+    """The force with which 95 % of trial pushes at the flange would be listed. [N]
+
+    Each lasts `PSEUDO`, somewhere in the log, in any direction. Without it the model error
+    explains its torque: evidence ½F² Σν²/S, ν of 1 N. At rest F_c must give way first.
+    """
+    blocks, process = found.log
+    count = len(blocks.t)
+    edge, long = (round(seconds / free.seconds) for seconds in (MARGIN, PSEUDO))
+    starts = np.linspace(0, max(count - long, 0), MOST_PSEUDO).astype(int)
+    number = np.arange(-edge, long + edge)[:, None]
+    at, inside = np.clip(starts + number, 0, count - 1), (number >= 0) & (number < long)
+    middle = at[len(at) // 2]
+    rests, chain = blocks.rests[middle], free.log.robot.loaded_chain
+    axes = np.linalg.qr(np.random.default_rng(0).normal(size=(MOST_PSEUDO, 3, 3)))[0]
+    torque = axes @ flange_jacobian(chain, blocks.q[middle])[:, :3]
+    decay, added, *others = (x[at, None].repeat(3, axis=2) for x in process)
+    added[0] /= np.maximum(1.0 - decay[0] ** 2, 1e-9)
+    process = ErrorProcess(decay, added, *others)
+    square, _ = innovations(inside[..., None, None] * torque, process)
+    limit = np.where((rests | ~untold).all(axis=1), least, LEAST_IN_MOTION)
+    force = np.sqrt(2.0 * limit[:, None] / square.sum(axis=(0, 3)))
+    held = (rests * free.noise.dry)[:, None] / np.maximum(abs(torque), 1e-9)
+    return float(np.quantile(np.maximum(force, held.min(axis=2)), 0.95))
 
 
 def false_rows(free: FreeStatistics) -> int:
     """Rows that the same search lists in free runs of other logs."""
-    seconds, count = free.seconds, 0
-    for run, _ in free.free:
-        if run.recording is not free.log.recording:
-            found = search(run, free.noise, free.level, seconds)
-            listed = np.flatnonzero(found.best > LEAST_EVIDENCE)
-            spans = [times_of(found.log.blocks, found.runs[k]) for k in listed]
-            count += sum(not follows_stop(run.recording, span, seconds) for span in spans)
-    return count
-
-
-def limits(
-    run: Run, free: FreeStatistics, stops: tuple[float, ...], smallest: float
-) -> list[Remark]:
-    """Limits of the whole list; the smallest force is the free part's. [N]"""
-    found = [caution("arm-stopped-abruptly", Where(span=(at, at)), at_s=at) for at in stops]
-    if free.basis != "free motion":
-        return found
-    unseen = [j + 1 for j in np.flatnonzero(~free.noise.seen).tolist()]
-    if len(unseen) == run.robot.joints:
-        # A free part at rest shows no friction: a share of F_c is added.
-        dry = UNSEEN_SHARE * free.noise.dry
-        found.append(caution("free-part-rests", least_N=max(smallest, felt_by(run, dry))))
-    elif unseen:
-        found.append(caution("free-part-misses-joints", Where(joints=tuple(unseen))))
-    return found
-
-
-def felt_by(run: Run, torque: Array) -> float:
-    """Median over the log of the smallest force that the joint torques show. [N]
-
-    Along the best axis; each joint hides 1.96 standard deviations (n,) [N·m].
-    """
-    some = slice(None, None, -(-len(run.q) // POSES))
-    J = abs(flange_jacobian(run.robot.loaded_chain, run.q[some])[:, :3])
-    return float(np.median(np.min(Z_95 * torque / np.maximum(J, 1e-9), axis=2).min(axis=1)))
+    each = (
+        (run, search(run, free.noise, free.level, free.seconds))
+        for run, _ in free.free
+        if run.recording is not free.log.recording
+    )
+    return sum(
+        nats > LEAST_EVIDENCE and not follows_stop(run.recording, span, free.seconds)
+        for run, found in each
+        for span, nats in zip(found.spans, found.best, strict=True)
+    )
 
 
 def without_list(run: Run) -> ContactList:
@@ -276,7 +285,6 @@ def without_list(run: Run) -> ContactList:
     )
 
 
-POSES = 20_000  #: Most samples for the median over poses.
 #: No joint moves for so long about a contact's start: rest. [s]
 EDGE = 1.0
 #: Share of the time since the first motion that makes a load.

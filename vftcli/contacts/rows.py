@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vftcli.contacts.contact_list import SURE_NATS, WIDE, Contact, ForceCourse
-from vftcli.contacts.free_statistics import FreeStatistics, PseudoContactTest, self_test
+from vftcli.contacts.free_statistics import FreeStatistics, self_test
 from vftcli.contacts.search import Candidates
 from vftcli.contacts.windows import (
     LEAST_IN_MOTION,
@@ -115,7 +115,7 @@ class ContactMeasurement:
     found: Candidates  #: The contacts that were kept.
     log: BlockLog  #: The log in blocks; joints at rest may settle anew under a contact.
     prior: WrenchPrior  #: Prior of the contacts' wrench.
-    test: PseudoContactTest  #: Errors of a wrench in free motion.
+    widening: Array  #: Factor on each axis' SD that free motion asks. (6,)
     bent: float  #: Share of a peak's bend that may be hidden.
     tail: float = 0.0  #: How long a push may act before and after its blocks. [s]
 
@@ -127,7 +127,7 @@ class ContactMeasurement:
         like: "ContactMeasurement | None" = None,
         bent: float = BENT,
     ) -> "ContactMeasurement":
-        """Contacts of `free`'s log; prior and test from `like`, else from the log."""
+        """Contacts of `free`'s log; prior and widening from `like`, else from the log."""
         blocks, J = found.log.blocks, found.places[0].jacobian
         gate = covered(found.runs, len(blocks.t), 1)
         process = error_process(free.noise, blocks, gate)._replace(white=found.log.process.white)
@@ -135,7 +135,7 @@ class ContactMeasurement:
         if like is None:
             prior = learn_prior(log, J, found.runs, found.prior, rounds=2 if found.runs else 0)
             return cls(free.log, found, log, prior, self_test(free, prior), bent)
-        return cls(free.log, found, log, like.prior, like.test, bent, like.tail)
+        return cls(free.log, found, log, like.prior, like.widening, bent, like.tail)
 
     @cached_property
     def quiet(self) -> tuple[Array, Array]:
@@ -203,7 +203,7 @@ class ContactMeasurement:
     ) -> Contact:
         """One row of the list."""
         run, blocks = self.found.runs[number], self.log.blocks
-        span, inside, factor = slice(*run), course.within(run), WIDENED * self.test.widening
+        span, inside, factor = slice(*run), course.within(run), WIDENED * self.widening
         # Hidden by drive constants and block length, as for `best`.
         hidden = hidden_by_blocks(course.values, self.bent)[run[0] - course.first :]
         covariances = inside.covariance * np.outer(factor, factor) + hidden[: len(inside.values)]

@@ -29,6 +29,7 @@ from vftcli.contacts.windows import (
     learn_prior,
     places,
     smooth_lanes,
+    times_of,
 )
 from vftcli.robots.chain import flange_jacobian
 from vftcli.robots.run import Run
@@ -82,6 +83,11 @@ class Candidates(NamedTuple):
     def best(self) -> Array:
         """Evidence of each candidate's best place. (C,) [nats]"""
         return np.asarray(self.evidence.max(axis=1))
+
+    @property
+    def spans(self) -> list[Array]:
+        """When each candidate begins and ends. (C, 2) [s]"""
+        return [times_of(self.log.blocks, run) for run in self.runs]
 
     @property
     def lasts(self) -> list[float]:

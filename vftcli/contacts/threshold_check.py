@@ -133,11 +133,12 @@ def check_contacts(
     level = np.column_stack([thresholds.level(name, signals) for name in ("joints", "axes")])
     alarms = events(t, worst_of(level))
     names = [*(f"J{j}" for j in range(1, len(thresholds.joints) + 1)), *AXES]
-    own = [(n, one) for n, x in zip(names, level.T, strict=False) for one in events(t, x)]
-    own.sort(key=lambda alarm: alarm[1].start)
+    each = ((n, one) for n, x in zip(names, level.T, strict=False) for one in events(t, x))
+    own = sorted(each, key=lambda alarm: alarm[1].start)
     if reference is None:
-        listed = (checked(alarm, t, signals.force, own) for alarm in alarms)
-        contacts = tuple(contact._replace(delay=np.nan) for contact in listed)
+        contacts = tuple(
+            checked(alarm, t, signals.force, own)._replace(delay=np.nan) for alarm in alarms
+        )
         remarks = (caution("check-without-truth"),)
         return ThresholdDetection(signals.recording.name, contacts, remarks)
     true = [c for c in true_contacts(reference) if c.stop >= t[0] + SETTLING]
@@ -167,7 +168,7 @@ def checked(
         for by, alarm in alarms
         if contact.start - EARLY <= alarm.start <= contact.stop
     ]
-    delay, by = begun[0] if begun else (float("nan"), "")
+    delay, by = begun[0] if begun else (np.nan, "")
     above = not by and any(alarm.start < contact.start <= alarm.stop for _, alarm in alarms)
     return CheckedContact(*contact, peak, delay, by, above)
 

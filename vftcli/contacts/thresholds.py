@@ -261,9 +261,9 @@ def find_thresholds(free: Sequence[ComparedSignals], rate: float) -> Thresholds:
     check_alike(free)
     joints, axes, force = (thresholds_of_set(free, field, rate) for field in SETS.values())
     if not joints:
-        longest = max(signals.recording.duration for signals in free)
         raise ParameterError(
-            f"the longest free log has {longest:.3g} s: too short to count how often a level is "
+            f"the longest free log has {max(signals.recording.duration for signals in free):.3g} "
+            "s: too short to count how often a level is "
             f"passed; record at least {LONG_ENOUGH:g} s, better an hour"
         )
     remarks = remarks_on(free, len(joints), rate)
@@ -315,8 +315,9 @@ def thresholds_of_set(
 def remarks_on(free: Sequence[ComparedSignals], joints: int, rate: float) -> list[Remark]:
     """Remarks on the logs: source, extrapolation, missing signals."""
     first = free[0]
-    vendor = fact("thresholds-of-vendor")
-    remarks = [vendor if first.of_vendor else caution("thresholds-of-observer")]
+    remarks = [
+        fact("thresholds-of-vendor") if first.of_vendor else caution("thresholds-of-observer")
+    ]
     if first.frame:
         code = "thresholds-of-logged-wrench" if first.logged_wrench else "thresholds-of-torques"
         remarks.append(fact(code, frame=first.frame))

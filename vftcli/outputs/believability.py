@@ -51,7 +51,6 @@ LOADS = {"unmodelled-load", "light-load", "payload-mismatch", "contact-is-load"}
 LIST_SUBJECTS = {
     "contact-is-load": "lasting contact",
     "arm-stopped-abruptly": "stop",
-    "free-part-rests": "not moved",
     "free-part-misses-joints": "not moved",
     "no-wrench-of-few-joints": "wrench",
 }
@@ -232,13 +231,13 @@ def list_grounds(analysis: Analysis) -> Iterator[Ground]:
                 yield Ground("unknown", "contacts", sentence(remark))
                 break
         return
-    options = ("--robot", robot_option(analysis), "--free", "free.csv")
-    remedy = command("contacts", analysis.recording, *options)
+    name = robot_option(analysis)
+    remedy = command("contacts", analysis.recording, "--robot", name, "--free", "free.csv")
     if found.basis == "none":
         words = "none is given, and the robot has no friction model: no contact is listed"
         yield Ground("unknown", subject, words, remedy, of_log=False)
     elif found.basis != "free motion":
-        words = "none is given: pushes weaker than friction are missed, sizes are unchecked"
+        words = "none is given: sizes are unchecked"
         yield Ground("caution", subject, words, remedy, of_log=False)
     else:
         false = found.false_on_free or 0
@@ -268,7 +267,7 @@ def friction_grounds(analysis: Analysis) -> Iterator[Ground]:
         )
         subject = "the arm is still" if rests.all() else "joints at rest"
         names = ", ".join(f"J{j + 1}" for j in joints)
-        if len(joints) > 2 and joints[-1] - joints[0] == len(joints) - 1:
+        if len(joints) > 2 and np.ptp(joints) < len(joints):
             names = f"J{joints[0] + 1}…J{joints[-1] + 1}"
         yield Ground("caution", subject, f"{names}: {hides}", of_log=False)
     name = robot_option(analysis)
@@ -360,8 +359,9 @@ def remedy_of(finding: Remark, log: Recording, analysis: Analysis) -> str:
     if finding.code == "other-robot":
         return command("contacts", log, "--robot", str(finding.values["robot"]))
     if finding.code.startswith("no-robot-fits"):
-        base = ("--robot", robot, "--method", "base", "-o", "my_robot.toml")
-        return command("identify", None, *base)
+        return command(
+            "identify", None, "--robot", robot, "--method", "base", "-o", "my_robot.toml"
+        )
     return command("inspect", log, "--robot", robot)
 
 
@@ -369,8 +369,8 @@ def payload_command(analysis: Analysis) -> str:
     """The command that finds the load on the flange."""
     runs = [run.recording for run in analysis.motion.runs]
     free = ["--free", path_of(runs[0])] if runs else []
-    found = ("--method", "payload", "--robot", robot_option(analysis), "-o", "loaded.toml")
-    return command("identify", analysis.recording, *free, *found)
+    end = "--robot", robot_option(analysis), "-o", "loaded.toml"
+    return command("identify", analysis.recording, *free, "--method", "payload", *end)
 
 
 def robot_option(analysis: Analysis) -> str:

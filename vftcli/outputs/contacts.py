@@ -65,20 +65,18 @@ def otherwise(found: ContactList) -> str:
     least = found.detectable_force
     if found.smallest_force is None or any(c.is_load for c in found.contacts):
         return ""
-    if least is None and np.isnan(found.smallest_force):
-        return ""
     if least is None:
         return "A push along one axis may go unseen: the pose hardly shows it."
-    if found.basis != "free motion" or not (found.contacts or found.tells_untouched):
-        more = f" {counted(len(found.candidates), 'candidate')} more: --all."
-        return (
-            f"Pushes below {at_least_shown(least)} do not show.{more if found.candidates else ''}"
-        )
+    if not found.tells_untouched:
+        others = found.candidates
+        more = f" {counted(len(others), 'candidate')} more: --all." if others else ""
+        long = "" if found.basis == "free motion" else ", or through half of the log,"
+        return f"Pushes below {at_least_shown(least)}{long} may not show.{more}"
     rest = f"{'Nothing else' if found.contacts else 'Nothing'} above {at_least_shown(least)}"
-    if any(c.peak_force is not None and c.peak_force < least for c in found.contacts):
+    if any((c.peak_force or least) < least for c in found.contacts):
         # Along the best axes smaller forces show.
         return f"{rest} (less at good poses)."
-    return f"{rest}. Weaker pushes would not show."
+    return f"{rest}. Weaker pushes may not show."
 
 
 def answer(found: ContactList) -> str:
@@ -121,10 +119,8 @@ def list_words(found: ContactList) -> str:
     where = "" if hardest.where == "cannot tell" else f" on the {hardest.where}"
     weak = " (weak)" if hardest.trust == "weak" else ""
     # One of unknown size may be harder.
-    most = max(c.peak_force or 0.0 for c in found.contacts)
-    sure = (hardest.peak_force or 0.0) >= most and not any(
-        c.place_unknown for c in found.contacts
-    )
+    force = hardest.peak_force or 0.0
+    sure = not any(c.place_unknown or (c.peak_force or 0.0) > force for c in found.contacts)
     name = "The hardest" if sure else "The hardest of known size"
     return f"{what} {name}, at {hardest.peak:.1f} s: {force_size(hardest)}{where}{weak}."
 
@@ -136,8 +132,7 @@ def none_words(found: ContactList) -> str:
             "No contact stands out from the free part, which itself shows "
             f"{found.false_on_free}: was nobody there?"
         )
-    known = found.basis == "free motion"
-    if known and not found.candidates:
+    if found.tells_untouched:
         return "Nothing touched the arm, as far as this log shows."
     felt = [c for c in found.candidates if c.peak_force is not None]
     if not felt:
@@ -146,8 +141,8 @@ def none_words(found: ContactList) -> str:
     most = (hardest.peak_force or 0.0) + (hardest.place_band or 0.0)
     return (
         f"No contact stands out. Up to {most:.0f} N near {hardest.peak:.1f} s this model cannot "
-        f"explain: {'' if known else 'name free motion (--free) or '}measure your friction (vftcli "
-        "identify)."
+        f"explain: {'' if found.basis == 'free motion' else 'name free motion (--free) or '}"
+        "measure your friction (vftcli identify)."
     )
 
 
@@ -172,12 +167,9 @@ def hardest_words(found: ContactList) -> str:
 
 def direction(force: Array) -> str:
     """A force's direction in words: its main axes, the largest first."""
-    size = np.linalg.norm(force)
-    if size == 0.0:
-        return DASH
-    u = force / size
+    u = force / max(float(np.linalg.norm(force)), 1e-12)
     axes = [k for k in np.argsort(-np.abs(u), kind="stable").tolist() if abs(u[k]) > PART]
-    return ", ".join(AXIS_WORDS[k][int(u[k] > 0)] for k in axes)
+    return ", ".join(AXIS_WORDS[k][int(u[k] > 0)] for k in axes) or DASH
 
 
 def place_words(contact: Contact) -> str:
@@ -196,7 +188,7 @@ def reason(contact: Contact) -> str:
         return "lasts for most of the log"
     if contact.remarks:
         return sentence(next(iter(contact.remarks)))
-    if contact.evidence is None or contact.evidence < SURE_NATS:
+    if (contact.evidence or 0.0) < SURE_NATS:
         return "little evidence: friction explains nearly as much"
     if contact.peak_force is None or contact.peak_band is None:
         return "too few joints to know the force"
@@ -298,7 +290,7 @@ def contact_grid(contacts: Sequence[Contact]) -> Grid:
     rows = []
     for contact in contacts:
         row = [str(contact.number), f"{contact.start:6.2f} – {contact.stop:6.2f}"]
-        if known and contact.wrench is not None and contact.anywhere:
+        if contact.wrench is not None and contact.anywhere:
             force = banded(contact.peak_force, contact.peak_band, unit="")
             row.append(force if contact.size_known else "unknown")
             row += [ranged(*contact.anywhere, unit=""), direction(contact.wrench[:3])]
@@ -336,15 +328,12 @@ def stored_list(record: Record) -> ContactList:
     """A list from its record, without its free motion."""
     model, torque, load = record["model"], record["largest_unexplained"], record["load"]
     prior = (model["tau_w_s"], model["sigma_force_N"], model["sigma_moment_Nm"])
-    if load:
-        mass = load["mass_kg"], load["mass_sd_kg"]
-        load = CarriedLoad(*mass, load["robot"], load["payload"], tuple(load["span_s"]))
     return ContactList(
         **{field: record[key] for field, key in LIST_KEYS.items()},
         contacts=tuple(map(stored_contact, record["contacts"])),
         candidates=tuple(map(stored_contact, record["candidates"])),
         unexplained=torque and Unexplained(**torque),
-        load=load,
+        load=load and CarriedLoad(*load.values()),
         stops=tuple(record["stops_s"]),
         model=ContactModel(
             prior=None if None in prior else WrenchPrior(*prior),
@@ -377,7 +366,7 @@ def stored_contact(row: Record) -> Contact:
 def stored_remark(record: Record) -> Remark:
     """A remark from its record."""
     span = record["span_s"]
-    where = Where(record["about"] or "", tuple(record["joints"]), tuple(span) if span else None)
+    where = Where(record["about"] or "", tuple(record["joints"]), span and tuple(span))
     return Remark(record["code"], record["level"], record["values"], where)
 
 
