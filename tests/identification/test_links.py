@@ -15,16 +15,15 @@ from vftcli.identification.links import (
     base_parameters,
     group_parameters,
     is_physical,
-    least_change,
     nearest_physical_links,
     predicts_best_unpulled,
     pseudo_inertias,
     residuals,
     stack,
-    starting_point,
     thicken_links,
     triangle,
     triangulate,
+    truncated_step,
 )
 from vftcli.identification.shapes import Shape
 from vftcli.identification.training import ParameterColumns, PreparedLog
@@ -94,7 +93,8 @@ def test_triangles_are_the_weighted_equations(log):
 def test_stacking_finds_what_was_planted(log):
     start = planted() * 1.1
     triangles = stack(LAYOUT, [log], start)
-    x = least_change(triangles, start)
+    R, z = triangles.joined()
+    x = start + truncated_step(R, z - R @ start)[0]
     left = residuals(LAYOUT, log, x)
     # 53 parameters of 3750 equations take 1.4 % of the noise's square
     np.testing.assert_allclose(np.std(left, axis=0), [0.5, 0.5, 0.5, 0.1, 0.1, 0.1], rtol=0.1)
@@ -110,7 +110,8 @@ def test_least_squares_leaves_the_start_where_there_is_no_data():
     tau = Y @ true + 0.1 * rng.standard_normal((300, 6))
     rows = np.concatenate([Y, tau[:, :, None]], axis=2) / 0.1
     parts = tuple(triangle(part.reshape(-1, 61)) for part in np.array_split(rows, 5))
-    x = least_change(Triangles(layout, parts, 1.0), start)
+    R, z = Triangles(layout, parts, 1.0).joined()
+    x = start + truncated_step(R, z - R @ start)[0]
     # the first link's mass moves nothing: no motion tells it
     assert x[0] == pytest.approx(start[0], rel=1e-12)
     # noise 0.1·√(36/1800) = 0.014, and truncation
@@ -290,7 +291,7 @@ def test_a_step_is_newton_s_and_its_decrement_what_the_cost_falls_and_bends_by()
 def test_correlated_equations_count_less():
     chain = load_robot("ur5").chain
     triangles, _ = stacked(chain, chain_parameters(perturbed(chain, 2)), noise=0.5)
-    start = starting_point(triangles.layout, chain_parameters(chain))
+    start = thicken_links(chain_parameters(chain))
     correlated = triangles._replace(correlation=100.0)
     slow = nearest_physical_links(correlated, chain_parameters(chain), 1.0)
     strong = nearest_physical_links(triangles, chain_parameters(chain), 100.0)

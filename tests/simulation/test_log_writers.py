@@ -12,7 +12,8 @@ from vftcli.readers.references import read_reference
 from vftcli.robots import load_robot
 from vftcli.signals.errors import OutputError, ParameterError
 from vftcli.simulation import Simulation, load_scenario, simulate
-from vftcli.simulation.writers import TRUTH_FRAME, WRITERS, vendor_format
+from vftcli.simulation.scenario import Scenario
+from vftcli.simulation.writers import TRUTH_FRAME, WRITERS, usual_format
 
 LOSSY = ["duration=2.0", "sensing.repeated=0.02", "sensing.dropped=0.02"]
 
@@ -159,4 +160,4 @@ def test_a_robot_logs_only_in_its_own_formats(
     ("robot", "form"), [("ur3e", "rtde"), ("fr3", "libfranka"), ("m1013", "parquet")]
 )
 def test_an_arm_logs_as_its_vendor_does(robot: str, form: str) -> None:
-    assert vendor_format(load_robot(robot)) == form
+    assert usual_format(Scenario(name="log"), load_robot(robot)) == form

@@ -20,7 +20,6 @@ from vftcli.simulation.trajectories import (
     JointwiseSpec,
     OffsetsSpec,
     PosesSpec,
-    check_limits,
     check_start,
     plan,
 )
@@ -181,8 +180,7 @@ def base_columns(robot):
 def test_excitation_is_well_conditioned_inside_the_limits(name, rank, condition):
     scenario = load_scenario(f"{name}free-excitation")
     robot, series = load_robot(scenario.robot), scenario.trajectory
-    motion = series.motion(robot).at(np.linspace(0.0, series.period, 500, endpoint=False))
-    check_limits(robot, motion.q, motion.dq, name)
+    motion = plan(series, robot, np.linspace(0.0, series.period, 500, endpoint=False))
     known = np.where(np.isfinite(robot.limits.qdd_max), robot.limits.qdd_max, np.inf)
     assert np.all(np.abs(motion.ddq) <= known)
     columns = base_columns(robot)

@@ -95,7 +95,9 @@ def stack(layout: ParameterColumns, logs: Sequence[PreparedLog], start: Array) -
     x = start
     for _ in range(REWEIGHTINGS):
         triangles = triangulate(layout, logs, [residuals(layout, log, x) for log in logs])
-        x = least_change(triangles, start)
+        R, z = triangles.joined()
+        # It leaves the start only where there are data.
+        x = start + truncated_step(R, z - R @ start)[0]
     return triangles
 
 
@@ -137,12 +139,6 @@ def truncated_step(R: Array, rest: Array) -> tuple[Array, Array, Array]:
     step = Vt[keep].T @ ((U[:, keep].T @ rest) / S[keep]) / scale
     sd = np.sqrt(np.sum((Vt[keep].T / S[keep]) ** 2, axis=1)) / scale
     return step, sd, np.sum(Vt[~keep] ** 2, axis=0)
-
-
-def least_change(triangles: Triangles, start: Array) -> Array:
-    """Least squares that leaves the start only with data. (size,)"""
-    R, z = triangles.joined()
-    return start + truncated_step(R, z - R @ start)[0]
 
 
 class Grouping(NamedTuple):
@@ -317,23 +313,17 @@ def solve(problem: Problem, x: Array) -> Array:
     )
 
 
-def starting_point(layout: ParameterColumns, x: Array) -> Array:
-    """Physical parameters near x to measure the distance from. (size,)"""
-    start = x.copy()
-    start[: layout.inertial] = thicken_links(x[: layout.inertial])
-    start[layout.rotor_places] = np.maximum(x[layout.rotor_places], 1e-3)
-    return start
-
-
 def pulled_links(
     triangles: Triangles, profile: Array, leave_out: int | None = None
 ) -> Iterator[tuple[float, Array]]:
     """Weights and their physical parameters (size,), strongest pull first."""
-    start = x = starting_point(triangles.layout, profile)
+    layout, x = triangles.layout, profile.copy()
+    x[: layout.inertial] = thicken_links(x[: layout.inertial])
+    x[layout.rotor_places] = np.maximum(x[layout.rotor_places], 1e-3)
     R, z = triangles.joined(leave_out)
     # Correlated rows repeat each other: divided, the misfit is a log-likelihood.
     shrink = 1.0 / np.sqrt(triangles.correlation)
-    problem = Problem(R * shrink, z * shrink, start, triangles.layout, np.inf)
+    problem = Problem(R * shrink, z * shrink, x, layout, np.inf)
     for weight in WEIGHTS[::-1]:
         # Each optimum is a good start for the next, weaker pull.
         x = solve(problem._replace(weight=weight), x)

@@ -328,7 +328,9 @@ def with_vector(
 ) -> Robot:
     """The robot with a vector of parameters, a mounted payload included."""
     phi = np.array([round_digits(v, 12) for v in x[: layout.inertial]])
-    rotor = np.array([round_digits(v) for v in x[layout.rotor_places]]) if layout.rotor else None
+    rotor = robot.chain.rotor_inertia
+    if layout.rotor:
+        rotor = np.array([round_digits(v) for v in x[layout.rotor_places]])
     chain = with_parameters(robot.chain, phi, rotor)
     return replace(robot, chain=chain, payload=None, friction=friction)
 

@@ -111,7 +111,7 @@ def load_at_flange(
             f"{names}: the load's centre of mass comes out {away:.2g}"
             " m from the flange; the logs do not fit this robot"
         )
-    load = Payload(mass=mass, com=com, inertia=np.zeros((3, 3)))
+    load = Payload(mass=mass, com=com)
     return LoadFit(load, mass_sd, spread, left, tuple(loaded), origin)
 
 
@@ -368,7 +368,7 @@ def weigh_motion(runs: Sequence[Run], carried: Array) -> tuple[Array, Array, Arr
 
 def carrying(run: Run, x: Array) -> Run:
     """A run with a point mass x (4,) [kg, kg·m] in flange axes in its model."""
-    load = Payload(mass=float(x[0]), com=x[1:] / x[0], inertia=np.zeros((3, 3)))
+    load = Payload(mass=float(x[0]), com=x[1:] / x[0])
     q, dq, bare, terms = run.recording.q, run.recording.require("dq"), run.robot.chain, run.terms
     own, loaded = momentum_terms(bare, q, dq), momentum_terms(bare.with_payload(load), q, dq)
     more = loaded.coriolis_transpose_dq - own.coriolis_transpose_dq

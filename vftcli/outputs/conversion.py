@@ -26,7 +26,7 @@ from vftcli.signals.arrays import Array
 from vftcli.signals.columns import StatedFrame
 from vftcli.signals.errors import OutputError
 from vftcli.signals.recording import COLUMN_NAMES, JOINT_SIGNALS, Recording
-from vftcli.simulation.writers.rosbag2 import Value, in_parts, schema_text, serialised, stamped
+from vftcli.simulation.writers.rosbag2 import Value, schema_text, serialised, six, stamped
 
 if TYPE_CHECKING:
     import polars as pl
@@ -98,9 +98,8 @@ def write_mcap(path: Path, analysis: Analysis) -> None:
 
 def wrench_topic(name: str, frame: str, values: Array) -> OutputTopic:
     """A topic of WrenchStamped messages. (T, 6) [N, N·m]"""
-    force = in_parts("wrench.force", "xyz", values[:, :3])
-    moment = in_parts("wrench.torque", "xyz", values[:, 3:])
-    return OutputTopic(name, WRENCH, {"header.frame_id": frame, **force, **moment})
+    parts = six("wrench", ("force", "torque"), values)
+    return OutputTopic(name, WRENCH, {"header.frame_id": frame, **parts})
 
 
 def events(analysis: Analysis, start: int) -> list[Event]:

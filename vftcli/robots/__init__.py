@@ -186,7 +186,7 @@ def declared_payload(recording: "Recording") -> "Payload":
             "describe it in a [payload.NAME] section of the robot file and give --payload NAME"
         )
     centre = np.zeros(3) if com is None else np.asarray(com, float)
-    return Payload(mass=mass, com=centre, inertia=np.zeros((3, 3)))
+    return Payload(mass=mass, com=centre)
 
 
 __all__ = [

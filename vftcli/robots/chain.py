@@ -15,7 +15,7 @@ A robot file states its kinematics in one of three ways:
 """
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import field, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -34,7 +34,9 @@ class Payload(Shown):
 
     mass: float  #: Mass. [kg]
     com: Array  #: Centre of mass in flange axes, from the flange origin. (3,) [m]
-    inertia: Array  #: Inertia tensor about the centre of mass, in flange axes. (3, 3) [kg·m²]
+    #: Inertia tensor about the centre of mass, in flange axes; a point's is zero.
+    #: (3, 3) [kg·m²]
+    inertia: Array = field(default_factory=lambda: np.zeros((3, 3)))
 
     def __post_init__(self) -> None:
         seal(self, "com", shape=(3,), called="the payload")

@@ -34,7 +34,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from vftcli.robots.robot import JointFriction, Robot
-from vftcli.signals.arrays import Array, empty_series
+from vftcli.signals.arrays import Array
 from vftcli.signals.parsing import check_known
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, on_joints, warning
@@ -232,12 +232,9 @@ def friction_torque(
         deflection: State s of the play operator; None for undeflected joints. (T, n)
         temperature: NaN where not measured; None for that of the models. (T, n) [°C]
     """
-    torque = empty_series(*dq.shape)
-    if not friction:
-        torque[:] = 0.0
+    torque = np.zeros(dq.shape, order="F")
     for j, joint in enumerate(friction):
         if joint.model == "none":
-            torque[:, j] = 0.0
             continue
         check_known(joint.model, FRICTION_MODELS, f"no friction model {joint.model!r}")
         numbers = joint.parameters.items()
@@ -421,19 +418,13 @@ class RunningFriction:
         temperature: Array | None = None,
     ) -> Array:
         """Friction torque of the next samples, as `friction_torque` has it. (T, n) [N·m]"""
-        return friction_torque(
-            self.friction, dq, load, deflection=self.deflection(q), temperature=temperature
-        )
-
-    def deflection(self, q: Array) -> Array | None:
-        """State s of the play operator along the next angles; None without one."""
-        if not self._joints:
-            return None
-        found = play(q[:, self._joints], self._length, self.centre)
-        self.centre = found.centre
-        state = np.zeros(q.shape, order="F")
-        state[:, self._joints] = found.state
-        return state
+        state = None
+        if self._joints:
+            found = play(q[:, self._joints], self._length, self.centre)
+            self.centre = found.centre
+            state = np.zeros(q.shape, order="F")
+            state[:, self._joints] = found.state
+        return friction_torque(self.friction, dq, load, deflection=state, temperature=temperature)
 
 
 def measured_temperature(recording: Recording) -> Array | None:

@@ -127,8 +127,8 @@ def record(chain: Chain) -> tuple[Tape, dict[str, list[Value]]]:
         K = on.add(on.map(inertia[j], omega), on.cross(h, v), K)
         L = on.add(on.cross(omega, h), L)
         H = on.add(h, H)
-        coriolis = on.plus(on.cross_z(K, omega), on.cross_z(L, v))
-        weight = on.cross_z(H, gamma)
+        coriolis = on.plus(on.cross(K, omega)[2], on.cross(L, v)[2])
+        weight = on.cross(H, gamma)[2]
         results.append(
             {
                 "p": on.plus(K[2], on.times(Value(float(chain.rotor_inertia[j])), dq[j])),
@@ -315,12 +315,11 @@ def chain_parameters(chain: Chain) -> Array:
     return np.array(phi)
 
 
-def with_parameters(chain: Chain, phi: Array, rotor_inertia: Array | None = None) -> Chain:
+def with_parameters(chain: Chain, phi: Array, rotor_inertia: Array) -> Chain:
     """The chain with other parameters φ (10n,) and rotor inertias. (n,)"""
     bodies = []
     for mass, *moment, xx, xy, yy, xz, yz, zz in phi.reshape(chain.joints, LINK).tolist():
         com = np.array(moment) / mass if mass > 0 else np.zeros(3)
         tensor = symmetric([xx, xy, xz, yy, yz, zz]) - mass * point_tensor(com)
         bodies.append(Body(mass, com, tensor))
-    rotors = chain.rotor_inertia if rotor_inertia is None else rotor_inertia
-    return replace(chain, **stacked(bodies), rotor_inertia=rotors)
+    return replace(chain, **stacked(bodies), rotor_inertia=rotor_inertia)

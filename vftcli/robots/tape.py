@@ -117,10 +117,6 @@ class Tape:
         x, y, z = (self.dot((u[i], -u[j]), (v[j], v[i])) for i, j in ((1, 2), (2, 0), (0, 1)))
         return x, y, z
 
-    def cross_z(self, u: Vector, v: Vector) -> Value:
-        """The z of u × v."""
-        return self.dot((u[0], -u[1]), (v[1], v[0]))
-
     def turn(self, v: Vector, cosine: Value, sine: Value) -> Vector:
         """The vector turned about z by the angle with this cosine and sine."""
         x, y, z = v

@@ -274,7 +274,7 @@ def build_arm(scenario: Scenario, robot: Robot, rng: np.random.Generator) -> Tru
     if (sensor := scenario.force_sensor) is not None:
         if why := out_of_bounds("mass", (sensor.mass, sensor.tool_mass)):
             raise ParameterError(f"force_sensor.{why}")
-        body = Payload(mass=sensor.mass, com=np.array(sensor.com), inertia=np.zeros((3, 3)))
+        body = Payload(mass=sensor.mass, com=np.array(sensor.com))
         chain = chain.with_payload(body)
         if sensor.known:
             nominal = nominal.with_payload(body)

@@ -301,10 +301,21 @@ def check_times(times: Array, length: float) -> None:
 
 
 def plan(spec: TrajectorySpec, robot: Robot, t: Array) -> Reference:
-    """Return the reference of a trajectory at times `t`, inside the robot's limits."""
-    reference = spec.motion(robot).at(t)
-    check_limits(robot, reference.q, reference.dq, f"trajectory {spec.kind!r}")
-    return reference
+    """The reference of a trajectory at times `t` [s]; it stays inside the robot's limits."""
+    motion, limits = spec.motion(robot).at(t), robot.limits
+    each = zip(motion.q.T, motion.dq.T, limits.q_min, limits.q_max, limits.qd_max, strict=True)
+    for j, (place, speed, low, high, most) in enumerate(each, start=1):
+        joint = f"trajectory {spec.kind!r}: joint {j} of {robot.name!r}"
+        if place.min() < low or place.max() > high:
+            raise ParameterError(
+                f"{joint} would move over {place.min():.3f} to {place.max():.3f} rad; its limits "
+                f"are {low:.3f} to {high:.3f}"
+            )
+        if (fastest := abs(speed).max()) > most:
+            raise ParameterError(
+                f"{joint} would move at {fastest:.2f} rad/s; its limit is {most:.2f}"
+            )
+    return motion
 
 
 def follow(robot: Robot, start: Array, offsets: Array, what: str) -> Array:
@@ -325,23 +336,6 @@ def follow(robot: Robot, start: Array, offsets: Array, what: str) -> Array:
             )
         path.append(q)
     return np.array(path)
-
-
-def check_limits(robot: Robot, q: Array, dq: Array, what: str) -> None:
-    """Raise a ParameterError unless a motion (T, n) stays inside the robot's limits."""
-    limits = robot.limits
-    each = zip(q.T, dq.T, limits.q_min, limits.q_max, limits.qd_max, strict=True)
-    for j, (place, speed, low, high, most) in enumerate(each, start=1):
-        if place.min() < low or place.max() > high:
-            raise ParameterError(
-                f"{what}: joint {j} of {robot.name!r} would move over {place.min():.3f} to "
-                f"{place.max():.3f} rad; its limits are {low:.3f} to {high:.3f}"
-            )
-        if (fastest := abs(speed).max()) > most:
-            raise ParameterError(
-                f"{what}: joint {j} of {robot.name!r} would move at {fastest:.2f} rad/s; "
-                f"its limit is {most:.2f}"
-            )
 
 
 def check_start(robot: Robot, start: tuple[float, ...]) -> Array:

@@ -237,14 +237,16 @@ UR_JOINTS, FRANKA_JOINTS = 6, 7
 
 
 def usual_format(scenario: Scenario, robot: Robot, wanted: str = "") -> str:
-    """The format asked for, the scenario's, or the vendor's usual one.
+    """The format asked for, the scenario's, or the vendor's: RTDE, libfranka's, a table.
 
     Raises:
         ParameterError: If there is no such format, or the arm cannot log in it.
     """
-    name = wanted or scenario.format or vendor_format(robot)
+    is_ur = drive_constants(robot) is not None and robot.joints == UR_JOINTS
+    usual = "libfranka" if robot.ros_state == ROBOT_STATE else "parquet"
+    name = wanted or scenario.format or ("rtde" if is_ur else usual)
     check_known(name, WRITERS, f"no log format {name!r}")
-    if name in {"rtde", "ur-rtde"} and not is_ur(robot):
+    if name in {"rtde", "ur-rtde"} and not is_ur:
         raise ParameterError(
             f"robot {robot.name!r} has no motor currents or not six joints and cannot log in a UR "
             "format; choose libfranka, rosbag2 or parquet with --as"
@@ -255,15 +257,3 @@ def usual_format(scenario: Scenario, robot: Robot, wanted: str = "") -> str:
             "choose rtde, rosbag2 or parquet with --as"
         )
     return name
-
-
-def is_ur(robot: Robot) -> bool:
-    """Whether an arm measures motor currents and has six joints."""
-    return drive_constants(robot) is not None and robot.joints == UR_JOINTS
-
-
-def vendor_format(robot: Robot) -> str:
-    """The format of an arm's vendor: RTDE for UR, libfranka's for Franka, or a table."""
-    if is_ur(robot):
-        return "rtde"
-    return "libfranka" if robot.ros_state == ROBOT_STATE else "parquet"

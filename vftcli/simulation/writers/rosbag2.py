@@ -26,6 +26,7 @@ MODE_MOVE = 2  #: ROBOT_MODE_MOVE of FrankaRobotState.
 
 JOINT_STATE = "sensor_msgs/JointState"
 WRENCH_STAMPED = "geometry_msgs/WrenchStamped"
+SENSOR = "/force_torque_sensor_broadcaster/wrench"  #: Topic of a flange sensor.
 ROBOT_STATE = "franka_msgs/FrankaRobotState"
 
 #: Names of a message's two vectors.
@@ -34,8 +35,8 @@ SAME = np.zeros((1, 3)), np.eye(3)[None]  #: Position and rotation of one frame 
 
 #: Text, names, a number, or numbers: one row a message, or one row for all.
 Value = str | Sequence[str] | float | NDArray[Any]
-#: A topic's name, type as package/Name, and messages (R, size).
-Topic = tuple[str, str, NDArray[np.uint8]]
+#: A topic's name, type as package/Name, and values but for the stamps.
+Topic = tuple[str, str, dict[str, Value]]
 
 
 def write_rosbag2(path: Path, simulation: Simulation) -> None:
@@ -50,45 +51,38 @@ def write_rosbag2(path: Path, simulation: Simulation) -> None:
     clock = simulation.measured.stamp[rows] + simulation.scenario.sensing.start
     stamps = np.array([round(float(t) * 1e9) for t in clock], np.int64)
     make = robot_states if simulation.robot.ros_state == ROBOT_STATE else joint_states
-    topics = [make(simulation, rows, stamps)]
+    topics = [make(simulation, rows)]
     if "wrench" in signals:
-        topics.append(wrenches(signals["wrench"][rows], stamps))
+        # In the sensor's frame, the force ON the robot.
+        values = six("wrench", WRENCH, signals["wrench"][rows])
+        values["header.frame_id"] = "ft_sensor"
+        topics.append((SENSOR, WRENCH_STAMPED, values))
+    times = stamped(stamps)
+    made = [serialised(kind, {**times, **values}, len(rows)) for _, kind, values in topics]
     with Writer(path, version=9, storage_plugin=StoragePlugin.MCAP) as bag:
         ends = [
-            (bag.add_connection(name, long_name(kind), typestore=type_store()), messages)
-            for name, kind, messages in topics
+            bag.add_connection(name, long_name(kind), typestore=type_store())
+            for name, kind, _ in topics
         ]
         for k, stamp in enumerate(stamps.tolist()):
-            for connection, messages in ends:
+            for connection, messages in zip(ends, made, strict=True):
                 bag.write(connection, stamp + RECEIVED_LATER_NS, messages[k].tobytes())
 
 
-def joint_states(simulation: Simulation, rows: Indices, stamps: Indices) -> Topic:
+def joint_states(simulation: Simulation, rows: Indices) -> Topic:
     """`/joint_states`; effort in A for a current-driven arm, in N·m for the others."""
     names = [f"{name.removesuffix('_joint')}_joint" for name in simulation.robot.chain.names]
     seen = simulation.measured.signals
     values: dict[str, Value] = {
-        **stamped(stamps),
         "name": names,
         "position": seen["q"][rows],
         "velocity": seen["dq"][rows],
         "effort": seen["current" if "current" in seen else "torque"][rows],
     }
-    return "/joint_states", JOINT_STATE, serialised(JOINT_STATE, values, len(rows))
+    return "/joint_states", JOINT_STATE, values
 
 
-def wrenches(readings: Array, stamps: Indices) -> Topic:
-    """`/force_torque_sensor_broadcaster/wrench`, sensor frame, force ON the robot."""
-    values = {
-        **stamped(stamps),
-        "header.frame_id": "ft_sensor",
-        **six("wrench", WRENCH, readings),
-    }
-    messages = serialised(WRENCH_STAMPED, values, len(readings))
-    return "/force_torque_sensor_broadcaster/wrench", WRENCH_STAMPED, messages
-
-
-def robot_states(simulation: Simulation, rows: Indices, stamps: Indices) -> Topic:
+def robot_states(simulation: Simulation, rows: Indices) -> Topic:
     """Franka's state topic, signs as libfranka's; other fields are zero."""
     samples, seen = simulation.samples, simulation.measured.signals
     names = [f"{simulation.robot.name}_joint{j}" for j in range(1, 8)]
@@ -106,7 +100,6 @@ def robot_states(simulation: Simulation, rows: Indices, stamps: Indices) -> Topi
     in_flange = [np.einsum("kji,kj->ki", actual.rotation, part) for part in np.hsplit(force, 2)]
     about_base = force[:, 3:] + np.cross(actual.position, force[:, :3])
     values: dict[str, Value] = {
-        **stamped(stamps),
         **{f"{joints}.name": names for joints in (measured, desired, motor, external)},
         f"{measured}.position": q,
         f"{measured}.velocity": dq,
@@ -132,8 +125,7 @@ def robot_states(simulation: Simulation, rows: Indices, stamps: Indices) -> Topi
         "control_command_success_rate": 1.0,
         "robot_mode": MODE_MOVE,
     }
-    messages = serialised(ROBOT_STATE, values, len(rows))
-    return "/franka_robot_state_broadcaster/robot_state", ROBOT_STATE, messages
+    return "/franka_robot_state_broadcaster/robot_state", ROBOT_STATE, values
 
 
 def serialised(kind: str, values: Mapping[str, Value], rows: int) -> Bytes:
