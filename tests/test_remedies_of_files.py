@@ -364,8 +364,7 @@ COMMANDS: dict[str, tuple[Command, tuple[Command, ...]]] = {
     ),
     "holds estimates, not what the drives measured": (
         lambda f: ["estimate", estimated(f), "--robot", "ur5", "-o", "out"],
-        (lambda f: ["contacts", f / "made" / "estimates.parquet"],
-         lambda f: ["admit", f / "made" / "estimates.parquet", "--robot", "ur5"]),
+        (lambda f: ["admit", f / "made" / "estimates.parquet", "--robot", "ur5"],),
     ),
     "of another log `vftcli estimate` writes": (
         on(same, "annotate", "-o", "out", "--robot", "ur5"),

@@ -89,7 +89,7 @@ def test_kept_columns_are_not_those_of_estimates(run, here: Path) -> None:
     code, _, err = run("estimate", CIRCLE, "-o", "out")
     assert (code, "--columns=-t,q:6" in err) == (1, True)
     assert run("estimate", CIRCLE, "-o", "out", "--config", "none", "--robot", "ur5")[0] == 0
-    code, _, err = run("contacts", here / "out/estimates.parquet")
+    code, _, err = run("admit", here / "out/estimates.parquet")
     assert (code, "--columns" in err) == (0, False)
 
 

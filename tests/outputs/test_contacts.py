@@ -2,9 +2,7 @@
 
 import csv
 import io
-import json
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -18,8 +16,7 @@ from vftcli.contacts.contact_list import (
     Unexplained,
 )
 from vftcli.outputs import contacts
-from vftcli.outputs.run_record import jsonable, to_json
-from vftcli.signals.errors import LogError
+from vftcli.outputs.run_record import jsonable
 from vftcli.signals.remarks import caution
 
 KEYS = {"recording", "frame", "sign", "free_part", "smallest_force_N", "contacts", "candidates"}
@@ -206,25 +203,3 @@ def test_trust_says_why(changed, words):
 )  # fmt: skip
 def test_what_can_be_said_of_the_rest(changed: dict[str, object], words: str) -> None:
     assert contacts.otherwise(contact_list(**changed)) == words
-
-
-def test_a_list_survives_its_record() -> None:
-    rows = contact(), BARE, contact(number=3, inferred=True)
-    assert [rows[0].trust, rows[2].trust] == ["good", "fair"]
-    record = json.loads(to_json(contacts.contacts_record(contact_list(*rows, free=()))))
-    assert json.loads(to_json(contacts.contacts_record(contacts.stored_list(record)))) == record
-
-
-@pytest.mark.parametrize(
-    ("text", "words"),
-    [
-        (None, "no run.json of theirs is beside it; give the log"),
-        ("{}", "no run.json of theirs is beside it"),
-        ('{"contacts": null, "input": {"path": "a.csv", "sha256": ""}}', "log, a.csv"),
-    ],
-)
-def test_without_a_list_a_log_is_asked_for(text: str | None, words: str, tmp_path: Path) -> None:
-    if text is not None:
-        (tmp_path / "run.json").write_text(text, encoding="utf-8")
-    with pytest.raises(LogError, match=words):
-        contacts.stored_record(tmp_path / "estimates.parquet")

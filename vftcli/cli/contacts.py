@@ -1,12 +1,11 @@
 """`vftcli contacts`: what touched the arm, when, how hard, where."""
 
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from vftcli.cli import options as opt
-from vftcli.cli.console import LeftOut, canvas, echo, echo_data, say_analysis, say_json
+from vftcli.cli.console import LeftOut, canvas, echo, echo_data, say_analysis
 from vftcli.evaluation import ReferenceChoice
 from vftcli.free_motion import FreeChoice
 from vftcli.signals.option import OUTPUT, Anyway, Asked, Choice, Option
@@ -41,11 +40,7 @@ def list_contacts(logs: opt.Logs, asked: Asked) -> None:
 
     from vftcli.pipeline import analyse, analyse_logs, list_touches
     from vftcli.readers.reading import Library
-    from vftcli.readers.references import stored_observers
 
-    if len(logs) == 1 and asked.words["columns"] is None and stored_observers(logs[0]):
-        print_stored(logs[0], asked)
-        return
     library = Library(logs)
     choice = opt.choice_for(asked, library, on_screen=not (json or csv))
     left_out, found = LeftOut(library, logs), []
@@ -56,20 +51,6 @@ def list_contacts(logs: opt.Logs, asked: Asked) -> None:
     if found:
         print_lists(found, asked, left_out.reasons)
     left_out.end(len(found))
-
-
-def print_stored(estimates: Path, asked: Asked) -> None:
-    """Print the list in the folder of an ``estimates.parquet``."""
-    from vftcli.outputs.contacts import contacts_csv, stored_list, stored_record
-    from vftcli.outputs.screen import list_screen
-
-    record = stored_record(estimates)
-    if asked.words["json"]:
-        say_json([record])
-    elif asked.words["csv"]:
-        echo_data(contacts_csv([stored_list(record)]))
-    else:
-        echo(list_screen(stored_list(record), canvas(), every=asked.words["all"]), nl=False)
 
 
 def print_lists(found: "list[Analysis]", asked: Asked, failed: "Mapping[str, str]") -> None:

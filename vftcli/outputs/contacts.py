@@ -1,26 +1,19 @@
-"""Contacts of a log in words, as a table, JSON, CSV; also from a `run.json`."""
+"""Contacts of a log in words, as a table, JSON, CSV."""
 
-import json
 from collections.abc import Sequence
-from dataclasses import fields, replace
-from pathlib import Path
+from dataclasses import replace
 
 import numpy as np
 
 from vftcli.contacts.contact_list import (
     FIRST_COLUMNS,
-    KEYS,
     SURE_NATS,
     TIGHT,
     WIDE,
-    CarriedLoad,
     Contact,
     ContactList,
-    ContactModel,
-    Unexplained,
 )
 from vftcli.outputs import Record
-from vftcli.outputs.files import SEAL
 from vftcli.outputs.grid import (
     DASH,
     Column,
@@ -32,10 +25,8 @@ from vftcli.outputs.grid import (
     ranged,
 )
 from vftcli.signals.arrays import Z_95, Array
-from vftcli.signals.errors import LogError
 from vftcli.signals.parsing import counted
-from vftcli.signals.remarks import Remark, Where, sentence
-from vftcli.wrench.smoother import WrenchPrior
+from vftcli.signals.remarks import sentence
 
 PART = 0.35  #: A direction names the axes with more than this share of the force.
 AXIS_WORDS = ("−x", "+x"), ("−y", "+y"), ("down", "up")  #: An axis' two directions, base axes.
@@ -48,16 +39,6 @@ LEGEND = (
     "or by little evidence"
 )
 FRAME, SIGN = "base axes, moment about the flange point", "on the robot"
-
-#: Field of a list, and of its model → its key in the record.
-LIST_KEYS = {
-    "recording": "recording", "duration": "duration_s", "basis": "basis", "free_seconds": "free_s",
-    "false_on_free": "false_on_free", "threshold": "evidence_threshold_nats",
-    "smallest_force": "smallest_force_N",
-}  # fmt: skip
-MODEL_KEYS = {
-    "noise_sd": "noise_sd_Nm", "error_sd": "friction_sd_Nm", "error_time": "friction_time_s",
-}  # fmt: skip
 
 
 def otherwise(found: ContactList) -> str:
@@ -234,7 +215,13 @@ def contacts_record(found: ContactList) -> Record:
     """A log's contacts for machines, units in the names."""
     model, prior = found.model, found.model.prior
     return {
-        **{key: getattr(found, field) for field, key in LIST_KEYS.items()},
+        "recording": found.recording,
+        "duration_s": found.duration,
+        "basis": found.basis,
+        "free_s": found.free_seconds,
+        "false_on_free": found.false_on_free,
+        "evidence_threshold_nats": found.threshold,
+        "smallest_force_N": found.smallest_force,
         "frame": FRAME,
         "sign": SIGN,
         "free_part": "; ".join(map(sentence, found.free)) or None,
@@ -245,7 +232,9 @@ def contacts_record(found: ContactList) -> Record:
             "tau_w_s": prior and prior.time,
             "sigma_force_N": prior and prior.force,
             "sigma_moment_Nm": prior and prior.moment,
-            **{key: getattr(model, field) for field, key in MODEL_KEYS.items()},
+            "noise_sd_Nm": model.noise_sd,
+            "friction_sd_Nm": model.error_sd,
+            "friction_time_s": model.error_time,
             "block_s": model.block,
         },
         "remarks": found.remarks,
@@ -304,72 +293,3 @@ def contacts_latex(found: ContactList) -> str:
     """A log's contacts as a table for a paper."""
     title = f"Contacts in {found.recording}"
     return latex(replace(contact_grid(found.contacts), title=title, notes=(LEGEND,)))
-
-
-def stored_record(estimates: Path) -> Record:
-    """Stored contacts: ``run.json`` beside an ``estimates.parquet``."""
-    path = estimates.with_name(SEAL)
-    try:
-        record = json.loads(path.read_text(encoding="utf-8"))
-        found, log = record["contacts"], record["input"]["path"]
-        about = {"path": log, "sha256": record["input"]["sha256"]}
-    except (OSError, ValueError, KeyError, TypeError):
-        raise LogError(
-            f"{estimates} holds estimates, and no {SEAL} of theirs is beside it; give the log"
-        ) from None
-    if not isinstance(found, dict):
-        raise LogError(f"{estimates} was made without a list of contacts; give the log, {log}")
-    if "basis" not in found:
-        raise LogError(f"{estimates} was written by an older vftcli; give the log, {log}")
-    return {**found, **about}
-
-
-def stored_list(record: Record) -> ContactList:
-    """A list from its record, without its free motion."""
-    model, torque, load = record["model"], record["largest_unexplained"], record["load"]
-    prior = (model["tau_w_s"], model["sigma_force_N"], model["sigma_moment_Nm"])
-    return ContactList(
-        **{field: record[key] for field, key in LIST_KEYS.items()},
-        contacts=tuple(map(stored_contact, record["contacts"])),
-        candidates=tuple(map(stored_contact, record["candidates"])),
-        unexplained=torque and Unexplained(**torque),
-        load=load and CarriedLoad(*load.values()),
-        stops=tuple(record["stops_s"]),
-        model=ContactModel(
-            prior=None if None in prior else WrenchPrior(*prior),
-            **{field: numbers(model[key]) for field, key in MODEL_KEYS.items()},
-            block=model["block_s"],
-        ),
-        remarks=tuple(map(stored_remark, record["remarks"])),
-    )
-
-
-def stored_contact(row: Record) -> Contact:
-    """One contact from its record."""
-    apart = {"places", "anywhere", "remarks"}
-    stored = {field.name for field in fields(Contact)} & KEYS.keys() - apart
-    given: Record = {name: row[KEYS[name]] for name in stored}
-    for name, unit in (("wrench", ""), ("wrench_sd", "_sd")):
-        force = row[f"force{unit}_N"]
-        given[name] = force and [*force, *row[f"moment{unit}_Nm"]]
-    given |= {name: numbers(v) for name, v in given.items() if isinstance(v, list)}
-    return Contact(
-        **given,
-        is_load=row["kind"] == "load",
-        inferred=row["trust"] != "good",
-        anywhere=row["anywhere_N"] and tuple(row["anywhere_N"]),
-        places=tuple(0 if place == "flange" else place for place in row["places"]),
-        remarks=tuple(map(stored_remark, row["remarks"])),
-    )
-
-
-def stored_remark(record: Record) -> Remark:
-    """A remark from its record."""
-    span = record["span_s"]
-    where = Where(record["about"] or "", tuple(record["joints"]), span and tuple(span))
-    return Remark(record["code"], record["level"], record["values"], where)
-
-
-def numbers(values: list[float | None]) -> Array:
-    """Numbers of a record, NaN where unknown. (n,)"""
-    return np.array([np.nan if value is None else value for value in values])

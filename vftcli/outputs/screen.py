@@ -26,8 +26,6 @@ from vftcli.outputs.believability import (
 )
 from vftcli.outputs.contacts import (
     LEGEND,
-    MOST_ROWS,
-    answer,
     contact_grid,
     forces_along,
     hardest_rows,
@@ -150,15 +148,6 @@ def log_screen(
         if text.count("\n") <= most:
             break
     return canvas.shown(text)
-
-
-def list_screen(found: ContactList, canvas: Canvas, *, every: bool) -> str:
-    """An earlier list: its log, the answer, the rows."""
-    head = f"{printable(found.recording)} · {found.duration:.1f} s · as listed by the earlier run"
-    lines = [canvas.painted(head, "bold"), "", f"  {answer(found)}", ""]
-    rows = list_lines(found, None if every else MOST_ROWS, canvas)
-    end = "For the reasons to believe it, and |F| over time: vftcli contacts on the log itself"
-    return canvas.shown("\n".join([*lines, *rows, "", end])) + "\n"
 
 
 def head_lines(analysis: Analysis, canvas: Canvas) -> list[str]:

@@ -242,6 +242,6 @@ def refuse_estimates(path: Path) -> None:
     """Raise where a log is needed and a file of our estimates is given."""
     if stored_observers(path):
         raise LogError(
-            f"{path} holds estimates, not what the drives measured; give the log. `vftcli "
-            "contacts` lists its contacts and `vftcli admit` replays its force as they are"
+            f"{path} holds estimates, not what the drives measured; give the log. Its "
+            "run.json has the contacts, and `vftcli admit` replays its force"
         )
