@@ -64,8 +64,9 @@ class AnalysisChoice:
     reference: "ReferenceChoice | None" = None
     #: Whether to list contacts, if the complete log may be used.
     contacts: bool = True
-    #: Whether the unasked wrench of `best` is left to `sense`: the first screen does without.
-    answers_first: bool = False
+    #: Called with the contacts of one log before any observer runs; `sense` then makes the
+    #: unasked wrench of `best`. None: nobody waits for the first lines.
+    answered: "Callable[[Analysis], None] | None" = field(default=None, compare=False)
     #: The logs of the command, each read once.
     library: Library = field(default_factory=Library, repr=False, compare=False)
     #: Examines them, each once, and refuses meaningless results.
@@ -169,11 +170,14 @@ def analyse(log: Run, choice: AnalysisChoice) -> Analysis:
     baselines = model(motion, choice)
     # Before the estimates: both of a long log do not fit at once.
     contacts, unlisted = find_contacts(motion, baselines, examinations[0], choice)
+    known = Analysis(motion=motion, observers=(), estimates=(), tunings={}, contacts=contacts)
+    if choice.answered is not None and contacts is not None:
+        choice.answered(replace(known, examinations=examinations))
     stage(f"{name}: running observers", 0.4, 0.5)
     analysis = refine(observe(motion, baselines, choice), baselines, choice)
     remarks = (*analysis.remarks, *unlisted)
     analysis = replace(analysis, contacts=contacts, examinations=examinations, remarks=remarks)
-    analysis = sense(analysis, choice, unasked=not choice.answers_first)
+    analysis = sense(analysis, choice, unasked=choice.answered is None)
     stage(f"{name}: comparing", 0.5, WRITING)
     analysis.spare()
     return judge(analysis, choice)
@@ -207,6 +211,8 @@ def analyse_logs(
                 raise
             failed(path, error)
     refuse_repeated_logs([recording for _, recording in recordings])
+    if len(recordings) > 1:  # the first lines of one say nothing of all
+        choice = replace(choice, answered=None)
     for path, recording in recordings:
         try:
             made = work(prepared(recording, choice), choice)

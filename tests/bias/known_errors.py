@@ -52,12 +52,12 @@ def shortened(robot, joints):
     )
 
 
-def wrong_run(robot, error=None, external=None, seconds=30.0, noise=0.0, seed=1):
+def wrong_run(robot, error=None, external=None, seconds=30.0, noise=0.0, seed=1, step=STEP):
     """A log of the arm that the robot describes but for `error`, touched by `external`. (T, n)
 
     White torque noise from seed 5. The torque is made by the regressor and the friction's formulas.
     """
-    t = STEP * np.arange(round(seconds / STEP))
+    t = step * np.arange(round(seconds / step))
     q, dq, ddq = motion(t, robot.joints, seed)
     chain = robot.loaded_chain
     rows = torque_regressor(chain, q, dq, ddq)

@@ -67,6 +67,21 @@ def test_a_planted_error_is_found_and_the_pushes_stay(run, found):
     assert np.mean(found.free) > 0.4
 
 
+def test_a_fast_log_loses_its_error_by_the_means_of_its_samples():
+    """At 1 kHz with the same noise a second; the error is the planted one on its own clock."""
+    robot = ur10e()
+    whole = wrong_run(robot, drawn_error(robot), pushes, seconds=34.0, noise=0.9, step=0.001)
+    assert whole.coarse.recording.samples == whole.recording.samples // 8
+    found = whole_log_bias(whole)
+    error = drawn_error(robot).torque(whole, smooth_motion(whole.coarse))
+    on = found.applied
+    assert on.sum() >= 5
+    assert np.all(rms(found.bias - error)[on] < 0.35 * rms(error)[on])  # as above
+    touched = np.abs(pushes(whole.t, whole.q)).max(axis=1) > 15.0
+    assert found.free.shape == whole.t.shape
+    assert np.mean(found.free[touched]) < 0.02
+
+
 def test_another_run_of_the_arm_loses_the_same_error(found):
     robot = ur10e()
     other = wrong_run(robot, drawn_error(robot), seconds=15.0, noise=0.3, seed=9)

@@ -57,9 +57,12 @@ def test_the_wrench_of_best_is_that_of_the_rows_and_holds_the_truth(name):
 def test_a_wrench_that_comes_after_the_answer_is_that_of_one_go():
     """A command prints its screen in between; what was asked for is there before it."""
     choice = AnalysisChoice(observers=ObserverChoice(names=("best",)))
-    first = replace(choice, answers_first=True)
+    told = []
+    first = replace(choice, answered=told.append)
     whole, answer = (analyse_log(FIXTURES / NAMES[0], each) for each in (choice, first))
     assert answer.virtual_sensor is None
+    assert [each.contacts for each in told] == [answer.contacts]
+    assert not told[0].estimates
     made = sense(answer, first).wrench
     np.testing.assert_array_equal(made.values, whole.wrench.values)
     np.testing.assert_array_equal(made.sd, whole.wrench.sd)

@@ -9,8 +9,9 @@ import pytest
 from vftcli.analysis import Analysis
 from vftcli.outputs import FULL, LEVELS, NONE, OutputChoice, report
 from vftcli.outputs.contacts import contacts_latex
+from vftcli.outputs.estimates import ERROR_TABLES, FILES, SUMMARY_FILES
 from vftcli.outputs.files import digests
-from vftcli.outputs.report import ERROR_TABLES, FILES, SUMMARY_FILES, write_report
+from vftcli.outputs.report import write_report
 from vftcli.signals.errors import OutputError, ParameterError
 
 

@@ -11,7 +11,7 @@ from vftcli.doctor.examination import Examiner
 from vftcli.readers.aliases import UR_NAMES, UR_WORDS
 from vftcli.readers.reader import ReadChoice
 from vftcli.robots import load_robot
-from vftcli.robots.run import SERIES, Run, paired, places, signal_edge, unwound
+from vftcli.robots.run import SERIES, Run, RunSamples, paired, places, signal_edge, unwound
 from vftcli.signals.errors import RobotError
 from vftcli.signals.filters import low_pass
 from vftcli.signals.recording import Recording
@@ -81,6 +81,23 @@ NAMES = ("base_yaw", "shoulder_pitch", "elbow_pitch", "wrist_a", "wrist_b", "wri
 
 
 FR3_NAMES = ("fr3_finger_1", *(f"fr3_joint{j}" for j in range(7, 0, -1)), "fr3_finger_2")
+
+
+def test_a_coarse_run_holds_means_of_whole_blocks():
+    """Of 33 000 samples of 1 ms, 8 in each; four and a third second are free."""
+    t = 0.001 * np.arange(33_001)
+    q = np.sin(np.outer(t, np.linspace(0.4, 1.4, 6)))
+    dq = np.gradient(q, t, axis=0)
+    log = Recording(t=t, q=q, dq=dq, current=np.ones_like(q))
+    run = Run(recording=log, robot=UR).less(np.full_like(q, 2.0))
+    free = RunSamples(run, (t >= 1.0) & (t < 5.333)).coarse
+    coarse = free.run
+    assert coarse.recording.samples == 33_000 // 8
+    np.testing.assert_allclose(coarse.t[:2], [0.0035, 0.0115], rtol=1e-12)
+    np.testing.assert_allclose(coarse.terms.mu[7], run.terms.mu[56:64].mean(axis=0), rtol=1e-12)
+    np.testing.assert_allclose(coarse.q[-1], q[32_992:33_000].mean(axis=0), rtol=1e-12)
+    assert np.count_nonzero(free.inside) == 541  # of 541.6 blocks those that are whole
+    assert coarse.coarse is coarse
 
 
 def log_of(names: tuple[str, ...]) -> Recording:

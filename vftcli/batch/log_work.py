@@ -172,8 +172,9 @@ def write_result(folder: Path, analysis: Analysis, task: LogTask) -> None:
 
         write_report(folder, [analysis], command=task.command, force=True, choice=job.written)
     elif job.do == "contacts":
+        from vftcli.outputs.estimates import CONTACTS
         from vftcli.outputs.files import OutputFolder
-        from vftcli.outputs.report import CONTACTS, put_contacts
+        from vftcli.outputs.report import put_contacts
 
         with OutputFolder(folder, True, CONTACTS) as files:
             put_contacts(files, "", [analysis], task.command)

@@ -25,7 +25,7 @@ from vftcli.robots.kernels import (
 from vftcli.robots.robot import Robot
 from vftcli.robots.run import Run
 from vftcli.robots.terms import GAP
-from vftcli.signals.arrays import Array, Indices, median_step, summed
+from vftcli.signals.arrays import Array, Indices, median_step, resample_columns, summed
 from vftcli.signals.filters import derivative, zero_phase
 
 #: What is faster is noise, or contact: the model's error follows the motion. [Hz]
@@ -125,14 +125,20 @@ class ModelError(NamedTuple):
         return np.concatenate([self.inertial, mine.ravel()])
 
     def torque(self, run: Run, motion: SmoothMotion) -> Array:
-        """The torque A δx that a model with this error asks for too little. (T, n) [N·m]"""
+        """The torque A δx that a model with this error asks for too little. (T, n) [N·m]
+
+        The smooth motion is that of the coarse run.
+        """
         chain = run.robot.loaded_chain
         wrong = with_parameters(
             chain, chain_parameters(chain) + self.inertial, chain.rotor_inertia + self.rotor
         )
         torque, _ = rigid_torque(wrong, motion.t, motion.q, motion.dq)
         torque += (self.drive - 1.0) * motion.rigid + self.offset
-        for shape, value in zip(friction_shapes(run, motion.gravity), self.friction, strict=True):
+        gravity, t = motion.gravity, run.coarse.t
+        if t is not run.t:
+            torque, gravity = (resample_columns(run.t, t, x) for x in (torque, gravity))
+        for shape, value in zip(friction_shapes(run, gravity), self.friction, strict=True):
             torque += value * shape
         return torque
 

@@ -14,9 +14,8 @@ from vftcli.bias.model_error import (
     error_columns,
     friction_alone,
     smooth_motion,
-    without_waits,
 )
-from vftcli.bias.whole_log import stride_of
+from vftcli.bias.whole_log import fitted_times, stride_of
 from vftcli.free_motion.free_motion import SIGN_SPEED
 from vftcli.observers.observer import Observer
 from vftcli.observers.spectra import ENOUGH, UNSEEN, FreeError, Spectra, error_band, free_error
@@ -70,14 +69,16 @@ def stated_band(found: Baseline, called: FreeError | None) -> Array:
         return error_band(called, nothing, run.rests, found.correction_sd)
     held = FreeError(nothing, (HELD * friction) ** 2, unseen=nothing > 0.0)
     try:
-        motion = smooth_motion(run)
+        motion = smooth_motion(run.coarse)
     except ClockError:
         usual = held._replace(moving=(UNSEEN * friction) ** 2)
         return error_band(usual, nothing, run.rests)
-    t, stride = motion.t, stride_of(motion.t)
-    columns = error_columns(run, motion, friction_alone(run.robot), stride)
+    stride = stride_of(motion.t)
+    columns = error_columns(run.coarse, motion, friction_alone(run.robot), stride)
     spread = np.column_stack([np.sqrt(np.sum(column**2, axis=1)) for column in columns])
-    return error_band(held, nothing, run.rests, resample_columns(t, t[::stride], spread))
+    return error_band(
+        held, nothing, run.rests, resample_columns(run.t, fitted_times(run), spread)
+    )
 
 
 def fitted_error(found: Baseline, reading: FreeReading) -> FreeError | None:
@@ -89,8 +90,7 @@ def fitted_error(found: Baseline, reading: FreeReading) -> FreeError | None:
     if off is None or np.count_nonzero(off.free) < ENOUGH:
         return None
     if off.load.any():
-        t = without_waits(run.t)
-        tau = tau - resample_columns(t, t[:: stride_of(t)], off.load)
+        tau = tau - resample_columns(run.t, fitted_times(run), off.load)
     elif found.load is not None:
         tau = tau - found.load.torque(run)
     return free_error(tau[off.free], run.rests[off.free], run.dry_friction)

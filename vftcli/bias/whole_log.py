@@ -81,8 +81,8 @@ class WholeLogBias:
     sd: Array
     #: Samples that the fit calls free of contact, all where nothing was fitted. (T,)
     free: Mask
-    #: External torque of the fit's slow loads, kept in estimates; or zero. At the samples
-    #: of the fit, by `stride_of`. (S, n) [N·m]
+    #: External torque of the fit's slow loads, kept in estimates; or zero. At
+    #: `fitted_times`. (S, n) [N·m]
     load: Array
     remarks: tuple[Remark, ...]  #: What was applied, and what was not and why.
     fitted: bool = (
@@ -108,25 +108,25 @@ class WholeLogBias:
         """Another run of the arm without this model error."""
         if self.error is None or not self.applied.any():
             return other
-        return other.less(-self.weight * self.error.torque(other, smooth_motion(other)))
+        return other.less(-self.weight * self.error.torque(other, smooth_motion(other.coarse)))
 
 
 def whole_log_bias(run: Run) -> WholeLogBias:
     """The model's bias along a log, of each joint where it predicts unseen samples."""
     run = run.steadied
-    terms = run.terms
-    span, refused = motion_of(run)
+    terms, coarse = run.terms, run.coarse
+    span, refused = motion_of(coarse)
     if refused:
         return untouched(terms, refused)
     expected = (expected_error if span >= LEAST_MOTION else friction_alone)(run.robot)
     # What no arm does overflows, and is refused.
     with np.errstate(all="ignore"):
         try:
-            motion = smooth_motion(run)
+            motion = smooth_motion(coarse)
             t, stride = motion.t, stride_of(motion.t)
-            d = zero_phase(t, derivative(t, terms.p) - terms.mu, CUTOFF)
+            d = zero_phase(t, derivative(t, coarse.terms.p) - coarse.terms.mu, CUTOFF)
             loads = slow_loads(run.robot.loaded_chain, t[::stride], motion.q[::stride])
-            columns = error_columns(run, motion, expected, stride)
+            columns = error_columns(coarse, motion, expected, stride)
             rows = Rows(columns=columns, loads=loads, d=d[::stride])
             fit = fit_robustly(rows, stride * median_step(t), usual_friction(run.robot)[0])
             tried = guarded(fit, motion.dq[::stride])
@@ -174,6 +174,12 @@ def motion_of(run: Run) -> tuple[float, Remark | None]:
     return span, None
 
 
+def fitted_times(run: Run) -> Array:
+    """Times of the coarse run that are fitted. (S,) [s]"""
+    t = run.coarse.t
+    return t[:: stride_of(without_waits(t))]
+
+
 def stride_of(t: Array) -> int:
     """Every how many samples are fitted."""
     rate = RATE if t[-1] - t[0] <= LONG else LONG_RATE
@@ -203,8 +209,9 @@ def bias_of(
     stride: int,
 ) -> WholeLogBias:
     """The bias on the log's own clock, with its uncertainty and remarks."""
-    t, n = motion.t, run.robot.joints
-    free = fit.free[np.minimum((np.arange(len(t)) + stride // 2) // stride, len(fit.free) - 1)]
+    n, half = run.robot.joints, stride // 2
+    nearest = (np.arange(len(run.t)) // run.blocked + half) // stride
+    free = fit.free[np.minimum(nearest, len(fit.free) - 1)]
     load = -fit.rows.loads.torque_of(found.loads)
     if found.solution is None:
         said = remarks_of(found, np.zeros(n), fit.free.mean())
@@ -213,7 +220,8 @@ def bias_of(
     error = error_of(expected.values * found.solution.model, n)
     whole = error.torque(run, motion)
     bias = found.weight * whole
-    spread = resample_columns(t, t[::stride], fit.rows.spread(found.solution.covariance))
+    spread = fit.rows.spread(found.solution.covariance)
+    spread = resample_columns(run.t, fitted_times(run), spread)
     # all of it with this probability, else nothing: w(1 − w) of its square
     undecided = np.sqrt(found.weight * (1.0 - found.weight)) * whole
     return WholeLogBias(

@@ -49,38 +49,40 @@ def report(
 
     Example: vftcli report fixtures/ur5_circle.csv --robot ur5
     """
-    from vftcli.evaluation.published import check_published, compare_with
-    from vftcli.outputs.estimates import extra_files
+    from vftcli.outputs.estimates import FILES, SUMMARY_FILES, extra_files, report_files
     from vftcli.outputs.files import OutputFolder
-    from vftcli.outputs.report import FILES, SUMMARY_FILES, report_files, write_report
     from vftcli.pipeline import WRITING, analyse_logs, sense
     from vftcli.readers.reading import Library
 
     library, written = Library(logs), opt.outputs_of(asked)
     output, details = opt.folder_of(output, logs, asked), asked.words["details"]
     published = asked.of(PrintChoice).table
-    labels = [library.label(log) for log in logs]
+    labels = map(library.label, logs)
     names = report_files(labels, written.extras, figures, several=len(logs) > 1)
     OutputFolder(output, force, names).check()
     choice = opt.choice_for(asked, library, on_screen=not json)
     if published is not None:
+        from vftcli.evaluation.published import check_published, compare_with
+
         check_published(published, asked.words["reference"])
         choice = replace(choice, observers=choice.observers.beside_print())
     # One of several logs may lack a wrench; details need it all.
-    choice = replace(choice, answers_first=len(logs) == 1 and not (json or details))
+    if len(logs) == 1 and not (json or details):
+        choice = replace(choice, answered=show_first_lines)
     left_out, analyses = LeftOut(library, logs), []
     for made in analyse_logs(logs, choice, left_out.add):
         analyses.append(made)
         if published is not None and made.errors is not None:
             table = compare_with(published, made.errors, made.observers, made.tunings)
             analyses[-1] = replace(made, published=table)
-        if not json:
-            say_analysis(made)
     if not analyses:
         left_out.end(0)
     failed = left_out.reasons
+    several = len(analyses) + len(failed) > 1
     if not json:  # the answer first, even if writing fails
-        show_answers(analyses, failed, details=details)
+        show_answers(analyses, failed, details=details, several=several)
+    from vftcli.outputs.report import write_report
+
     stage("writing", WRITING, 1.0)
     record = write_report(
         output,
@@ -91,7 +93,6 @@ def report(
         form=figures,
         failed=failed,
     )
-    several = len(analyses) + len(failed) > 1
     listed = SUMMARY_FILES if several else (*FILES, *extra_files(written.extras))
     say_written(record, output, (*listed, "figures/"), json=json, several=several)
     if show:
@@ -99,23 +100,40 @@ def report(
     left_out.end(len(analyses))
 
 
+def show_first_lines(made: "Analysis") -> None:
+    """Print the answer of a log's screen, before observers run."""
+    from vftcli.outputs.screen import first_lines
+
+    show(first_lines(made, canvas()))
+
+
 def show_answers(
-    analyses: "Sequence[Analysis]", failed: Mapping[str, str], *, details: bool
+    analyses: "Sequence[Analysis]", failed: Mapping[str, str], *, details: bool, several: bool
 ) -> None:
-    """Print the screen; with details every table behind it too."""
+    """Print the screen, or what follows its first lines; with details every table too."""
     from vftcli.outputs.error_tables import to_terminal
     from vftcli.outputs.grid import terminal
     from vftcli.outputs.grids import print_grid
-    from vftcli.outputs.screen import FILE_LINES, MOST_LINES, log_screen, logs_screen
+    from vftcli.outputs.screen import (
+        FILE_LINES,
+        MOST_LINES,
+        first_lines,
+        log_screen,
+        logs_screen,
+    )
 
-    if len(analyses) + len(failed) > 1:
+    if several:
         show(logs_screen(analyses, canvas(), failed, every=details))
     else:
-        show(log_screen(analyses[0], canvas(), most=MOST_LINES - FILE_LINES, every=details))
-    for made in analyses if details else ():
-        if made.errors is not None:
+        (made,) = analyses
+        text = log_screen(made, canvas(), most=MOST_LINES - FILE_LINES, every=details)
+        is_begun = made.contacts is not None and not details
+        show(text.removeprefix(first_lines(made, canvas()) if is_begun else ""))
+    for made in analyses:
+        say_analysis(made)
+        if details and made.errors is not None:
             show(to_terminal(made.errors, [made]))
-        if made.published is not None:
+        if details and made.published is not None:
             remarks = (f"- {remark}\n" for remark in made.published.remarks)
             show(terminal(print_grid(made.published)) + "".join(remarks))
 
@@ -163,14 +181,18 @@ def estimate(
     if set(written.extras) <= {"csv"} and comes_in_blocks(recording, choice):
         found: Analysis | Iterator[Group] = analysed_in_blocks(recording, choice)
     else:
-        choice = replace(choice, answers_first=not (json or asked.words["details"]))
+        if not (json or asked.words["details"]):
+            choice = replace(choice, answered=show_short)
         found = analyse(prepared(recording, choice), choice)
-        if not json:  # the answer first; of blocks at the end
-            show_short(found)
+        if not json:
+            if choice.answered is None or found.contacts is None:
+                show_short(found)
+            say_analysis(found)
         found = sense(found, choice)
     made, record = write_estimate_folder(output, found, asked.line, written, force)
-    if not json and made is not found:
+    if not json and made is not found:  # of blocks the answer comes at the end
         show_short(made)
+        say_analysis(made)
     say_written(record, output, names, json=json)
     if show:
         open_made(output)
@@ -180,5 +202,4 @@ def show_short(made: "Analysis") -> None:
     """Print the answer in short."""
     from vftcli.outputs.screen import short_screen
 
-    say_analysis(made)
     show(short_screen(made, canvas()))

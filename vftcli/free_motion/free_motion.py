@@ -134,12 +134,12 @@ class FreeMotion(Shown):
     @cached_property
     def period(self) -> Period:
         """The period of the log's motion."""
-        return find_period(self.log.recording, self.choice.period)
+        return find_period(self.log.coarse.recording, self.choice.period)
 
     @cached_property
     def cycles(self) -> Cycles:
         """The cycles of the log."""
-        return segment(self.log.recording, self.period)
+        return segment(self.log.coarse.recording, self.period)
 
     @cached_property
     def cycles_given(self) -> tuple[int, ...]:
@@ -163,7 +163,7 @@ class FreeMotion(Shown):
         """Free cycles of the log: the user's, else those found."""
         if self.cycles_given:
             return FreeCycles(self.cycles_given, None)
-        found = find_free_cycles(self.log, self.cycles)
+        found = find_free_cycles(self.log.coarse, self.cycles)
         self.log.spare()
         return found
 
@@ -282,7 +282,7 @@ def without_load(run: Run, load: FreeLoad | None) -> Run:
 
 def free_load(pieces: Sequence[RunSamples]) -> FreeLoad | None:
     """The load behind much of the free part's disturbance, or None."""
-    parts = [part for piece in pieces if (part := columns(piece)) is not None]
+    parts = [part for piece in pieces if (part := columns(piece.coarse)) is not None]
     if not parts:
         return None
     robot = pieces[0].run.robot

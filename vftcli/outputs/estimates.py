@@ -1,4 +1,4 @@
-"""Files of `vftcli estimate`: estimates as columns, `run.json`, extras."""
+"""Files of `vftcli estimate`: estimates as columns, `run.json`, extras; a report's names."""
 
 import json
 from collections.abc import Iterable, Iterator, Sequence
@@ -11,7 +11,7 @@ import numpy as np
 from vftcli.analysis import Analysis
 from vftcli.outputs import PLAIN, OutputChoice
 from vftcli.outputs.examination import overridden_lines
-from vftcli.outputs.files import SEAL, OutputFolder, put_table, table_file
+from vftcli.outputs.files import SEAL, OutputFolder, numbered, put_table, table_file
 from vftcli.outputs.run_record import run_record, seal
 from vftcli.signals.arrays import Array
 from vftcli.signals.columns import StatedFrame, described_schema
@@ -147,6 +147,37 @@ def extra_files(extras: Sequence[str]) -> tuple[str, ...]:
 def estimate_files(extras: Sequence[str]) -> tuple[str, ...]:
     """Names of the files of a folder with these extras."""
     return ("estimates.parquet", SEAL, *extra_files(extras))
+
+
+#: Files of the errors table, in the order of `error_tables.FORMS`.
+ERROR_TABLES = ("errors.csv", "errors.json", "errors.md", "errors.tex")
+CONTACTS = ("contacts.json", "contacts.csv")  #: The list of contacts, where it is made.
+CONTACT_TABLE = "figures/contacts.tex"  #: The list for a paper, beside its figures.
+#: Files of a report of one log; error tables only with a reference.
+FILES = ("index.html", "recording.rrd", "estimates.parquet", SEAL, *CONTACTS, *ERROR_TABLES)
+#: Head above the sub-folders of several logs.
+SUMMARY_FILES = ("index.html", SEAL, *CONTACTS, *ERROR_TABLES)
+
+
+def places_of(labels: Iterable[str]) -> list[str]:
+    """The sub-folder of each log: its file's name without the ending."""
+    return numbered(Path(label).stem or "log" for label in labels)
+
+
+def report_files(
+    labels: Iterable[str], extras: Sequence[str], form: str | None, *, several: bool
+) -> list[str]:
+    """Names of a report's files; `several` logs have sub-folders."""
+    own, above = [*FILES, *extra_files(extras)], [*SUMMARY_FILES]
+    if form is not None:
+        from vftcli.outputs.figures import ERROR_FIGURES, LOG_FIGURES
+        from vftcli.outputs.paper import figure_files
+
+        own += [CONTACT_TABLE, *figure_files(form, LOG_FIGURES)]
+        above += figure_files(form, ERROR_FIGURES)
+    if not several:
+        return own
+    return [*above, *(f"{place}/{name}" for place in places_of(labels) for name in own)]
 
 
 def write_extras(

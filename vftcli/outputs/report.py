@@ -11,40 +11,21 @@ from vftcli.analysis import Analysis
 from vftcli.outputs import NONE, PLAIN, OutputChoice, Record
 from vftcli.outputs import error_tables as tables
 from vftcli.outputs.contacts import contacts_csv, contacts_latex, contacts_record
-from vftcli.outputs.estimates import extra_files, write_estimates, write_extras
-from vftcli.outputs.figures import ERROR_FIGURES, LOG_FIGURES, error_figures, log_figures
-from vftcli.outputs.files import SEAL, OutputFolder, numbered, put_text
-from vftcli.outputs.paper import figure_files, write_figures
+from vftcli.outputs.estimates import (
+    CONTACT_TABLE,
+    ERROR_TABLES,
+    places_of,
+    report_files,
+    write_estimates,
+    write_extras,
+)
+from vftcli.outputs.figures import error_figures, log_figures
+from vftcli.outputs.files import SEAL, OutputFolder, put_text
+from vftcli.outputs.paper import write_figures
 from vftcli.outputs.run_record import envelope, log_entry, run_record, seal, to_json, versions
 from vftcli.signals.packages import installed
 from vftcli.signals.progress import steps
 from vftcli.signals.recording import trim
-
-#: Files of the errors table, in the order of `tables.FORMS`.
-ERROR_TABLES = ("errors.csv", "errors.json", "errors.md", "errors.tex")
-CONTACTS = ("contacts.json", "contacts.csv")  #: The list of contacts, where it is made.
-CONTACT_TABLE = "figures/contacts.tex"  #: The list for a paper, beside its figures.
-#: Files of a report of one log; error tables only with a reference.
-FILES = ("index.html", "recording.rrd", "estimates.parquet", SEAL, *CONTACTS, *ERROR_TABLES)
-#: Head above the sub-folders of several logs.
-SUMMARY_FILES = ("index.html", SEAL, *CONTACTS, *ERROR_TABLES)
-
-
-def places_of(labels: Sequence[str]) -> list[str]:
-    """The sub-folder of each log: its file's name without the ending."""
-    return numbered(Path(label).stem or "log" for label in labels)
-
-
-def report_files(
-    labels: Sequence[str], extras: Sequence[str], form: str | None, *, several: bool
-) -> list[str]:
-    """Names of a report's files; `several` logs have sub-folders."""
-    own = [*FILES, *extra_files(extras), *figure_files(form, LOG_FIGURES)]
-    own += [CONTACT_TABLE] * (form is not None)
-    if not several:
-        return own
-    above = [*SUMMARY_FILES, *figure_files(form, ERROR_FIGURES)]
-    return [*above, *(f"{place}/{name}" for place in places_of(labels) for name in own)]
 
 
 def write_report(

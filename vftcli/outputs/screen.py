@@ -126,12 +126,7 @@ def log_screen(
     analysis: Analysis, canvas: Canvas, *, most: int = MOST_LINES, every: bool = False
 ) -> str:
     """The screen of one log, of so many lines at most."""
-    first, *answered = head_lines(analysis, canvas)
-    listed, found, bars = analysis.contacts, grounds(analysis), list[str]()
-    if sized := [contact for contact in analysis.listed if contact.size_known]:
-        shown = [] if analysis.listed[0].is_load else hardest_rows(analysis.listed)
-        force, _ = forces_along(sized, analysis.t)
-        bars = force_bars(analysis.t, np.nan_to_num(force), shown, canvas)
+    head, listed, found = first_lines(analysis, canvas), analysis.contacts, grounds(analysis)
     tail, text = doubt_lines(analysis, canvas), ""
     if (leading := leading_block(analysis)) is not None:
         tail += canvas.wrapped(against(leading, analysis), 2)
@@ -143,11 +138,26 @@ def log_screen(
     for each, rows in FORMS[:1] if every else FORMS[1:]:
         table = [] if listed is None else list_lines(listed, rows, canvas)
         believed = belief_lines(found, canvas, each)
-        parts = [part for part in ([first, "", *answered], bars, table, believed + tail) if part]
-        text = "\n\n".join("\n".join(part) for part in parts) + "\n"
+        text = head + canvas.shown(paragraphs(table, believed + tail)) + "\n"
         if text.count("\n") <= most:
             break
-    return canvas.shown(text)
+    return text
+
+
+def first_lines(analysis: Analysis, canvas: Canvas) -> str:
+    """The facts, the answer and |F| as bars: of a log's screen what needs no observer."""
+    first, *answered = head_lines(analysis, canvas)
+    bars = list[str]()
+    if sized := [contact for contact in analysis.listed if contact.size_known]:
+        shown = [] if analysis.listed[0].is_load else hardest_rows(analysis.listed)
+        force, _ = forces_along(sized, analysis.t)
+        bars = force_bars(analysis.t, np.nan_to_num(force), shown, canvas)
+    return canvas.shown(paragraphs([first, "", *answered], bars)) + "\n\n"
+
+
+def paragraphs(*parts: Sequence[str]) -> str:
+    """Lines of paragraphs, an empty one between two."""
+    return "\n\n".join("\n".join(part) for part in parts if part)
 
 
 def head_lines(analysis: Analysis, canvas: Canvas) -> list[str]:

@@ -12,8 +12,8 @@ from vftcli.readers.aliases import UR_NAMES, UR_WORDS, kinematic_order
 from vftcli.readers.table import listed
 from vftcli.robots.friction import dry_friction
 from vftcli.robots.robot import Robot
-from vftcli.robots.terms import drive_torque, dynamics_terms
-from vftcli.signals.arrays import Array, Mask, handed_over, median_step
+from vftcli.robots.terms import TIE, drive_torque, dynamics_terms
+from vftcli.signals.arrays import Array, Mask, block_means, handed_over, median_step
 from vftcli.signals.errors import RobotError
 from vftcli.signals.external_torque import DynamicsTerms
 from vftcli.signals.filters import low_pass
@@ -25,10 +25,14 @@ from vftcli.signals.shown import Shown
 
 #: Samples from which on a recording's series do not stay in memory beside its results.
 LONG = 1 << 17
+#: Step of a run of which only the motion is of interest: a UR5's own. [s]
+COARSE = 0.008
+#: A run of fewer samples, half a minute of 1 kHz, is as good as its coarse one.
+WORTH = 1 << 15
 #: What has a value for each sample, and stays in a part of a run.
 SERIES = ("standing", "standstill", "drive_torque", "model_torque", "momentum")
 #: What is made again in less than an observer's pass.
-BULKY = (*SERIES[1:], "smooth_dq")
+BULKY = (*SERIES[1:], "smooth_dq", "coarse")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -128,6 +132,27 @@ class Run(Shown):
         whole = without_isolated(self.recording)
         return self if whole is self.recording else replace(self, recording=whole)
 
+    @cached_property
+    def coarse(self) -> "Run":
+        """The run by means of its samples over `COARSE`; itself where it is no finer."""
+        count = self.blocked
+        if count < 2:
+            return self
+        t, q, dq, drive_torque, p, mu = (
+            block_means(x, count)
+            for x in (self.t, self.q, self.dq, self.drive_torque, self.terms.p, self.terms.mu)
+        )
+        motion = Recording(t=t, q=q, dq=dq, source=self.recording.source)
+        terms = DynamicsTerms(t=t, p=p, mu=mu)
+        return replace(self, recording=motion).holding(terms=terms, drive_torque=drive_torque)
+
+    @property
+    def blocked(self) -> int:
+        """Samples that one of the coarse run is the mean of."""
+        if self.recording.samples < WORTH:
+            return 1
+        return max(1, int(COARSE / self.step + TIE))
+
     def less(self, torque: Array) -> "Run":
         """The run without an external torque (T, n) [N·m], μ ← μ + τ."""
         mu = handed_over(self.terms.mu + torque)
@@ -165,6 +190,14 @@ class RunSamples(NamedTuple):
 
     run: Run  #: The run.
     inside: Mask  #: Which of its samples they are. (T,)
+
+    @property
+    def coarse(self) -> "RunSamples":
+        """The samples of the coarse run that are means of these alone."""
+        if self.run.coarse is self.run:
+            return self
+        whole = block_means(self.inside.astype(float), self.run.blocked) == 1.0
+        return RunSamples(self.run.coarse, whole)
 
 
 def signal_edge(step: float, cutoff: float = 12.0) -> float:

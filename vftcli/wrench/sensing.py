@@ -21,7 +21,7 @@ from vftcli.observers.spectra import error_band, free_error, spectra_of
 from vftcli.robots.chain import link_poses
 from vftcli.robots.run import Run, RunSamples
 from vftcli.robots.terms import disturbance_impulse
-from vftcli.signals.arrays import Array, Mask, handed_over, resample_columns
+from vftcli.signals.arrays import Array, Mask, block_means, handed_over, resample_columns
 from vftcli.signals.errors import ParameterError, ReferenceTorqueError
 from vftcli.signals.external_torque import DynamicsTerms, ExternalTorque
 from vftcli.signals.option import numbers
@@ -105,7 +105,7 @@ def sense(
         for wanted in (True, False)
     )
     # In base axes --frame moves no zero; beside it the poses of the smoothed estimates.
-    raw, *bare = VirtualSensor(frame="base").wrenches((disturbance, *to_smooth), q, chain)
+    raw, *bare = slow_wrenches(log, (disturbance, *to_smooth))
     mounting, fitted = find_mounting(log.recording, log.robot, disturbance, choice)
     vendor = vendor_remarks(log.recording, raw, chain)
     sensor = VirtualSensor(solver=choice.by_pose, frame=choice.frame, mounting=mounting)
@@ -151,6 +151,35 @@ def sense(
             *vendor,
             *(remark for w in wrenches for remark in contact_elsewhere(w, free)),
         ),
+    )
+
+
+def slow_wrenches(log: Run, torques: Sequence[ExternalTorque]) -> tuple[Wrench, ...]:
+    """Wrenches in base axes of torques that change little in a sample of the coarse run."""
+    chain, coarse, sensor = log.robot.chain, log.coarse, VirtualSensor(frame="base")
+    if coarse is log:
+        return sensor.wrenches(torques, log.q, chain)
+    means = (block_means(torque.tau, log.blocked) for torque in torques)
+    slow = [
+        ExternalTorque(name=torque.name, t=coarse.t, tau=mean)
+        for torque, mean in zip(torques, means, strict=True)
+    ]
+    return tuple(resampled(wrench, log.t) for wrench in sensor.wrenches(slow, coarse.q, chain))
+
+
+def resampled(wrench: Wrench, t: Array) -> Wrench:
+    """A wrench without a band, interpolated to times t (T,) [s]."""
+    sigma, left = (
+        None if x is None else np.interp(t, wrench.t, x)
+        for x in (wrench.sigma_min, wrench.null_space)
+    )
+    return replace(
+        wrench,
+        t=t,
+        values=resample_columns(t, wrench.t, wrench.values),
+        sigma_min=sigma,
+        masked=np.interp(t, wrench.t, wrench.hidden) > 0.5,
+        null_space=left,
     )
 
 
