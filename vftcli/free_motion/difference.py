@@ -31,9 +31,6 @@ FARTHEST = 0.1  #: How far phase may lie from the clock's word, as the low-passe
 PHASE_CUTOFF = 8.0
 #: A stop this long leaves all of the dry friction open. [s]
 STUCK = 0.3
-#: From farther away a filter of 3 Hz, a 15 Hz log's, passes e^(−2π 3 Hz · sin(π/4) · 2 s)
-#: = 3e-12. [s]
-HEARD = 2.0
 #: Share of the stiction that cancels between two equal stops at one place.
 REPEATED = 0.5
 
@@ -164,12 +161,9 @@ class PairedRuns:
         """Share of torque variation missed by the model in the free run, ≤ 1. (n,)"""
         missed = total = np.zeros(self.motion.drive_torque.shape[1])
         for p in self.pairings:
-            used = p.free.t.searchsorted(p.times[p.known])
-            used = np.unique(used.clip(0, len(p.free.t) - 1))
-            # Of an hour only the free cycle, and what the filter needs.
-            pad = round(HEARD / p.free.step)
-            first = max(0, int(used[0]) - pad)
-            free, used = p.free.part(slice(first, int(used[-1]) + pad + 1)), used - first
+            free = p.free.coarse
+            used = free.t.searchsorted(p.times[p.known])
+            used = np.unique(used.clip(0, len(free.t) - 1))
             # Below the band of the noise.
             gap, edge = free.drive_torque - free.model_torque, signal_edge(free.step)
             missed = missed + low_pass(free.t, gap, edge)[used].var(axis=0)

@@ -36,7 +36,6 @@ from vftcli.signals.arrays import (
     Indices,
     Mask,
     handed_over,
-    median_step,
     root_mean_square,
     root_mean_squares,
     seal,
@@ -216,8 +215,6 @@ LEAST = (
 SURE = 4.0  #: SDs that it has to be.
 PARTLY = 0.8  #: Share of the free part's disturbance that it may leave at most.
 CUTOFF = 6.0  #: Where the disturbance is low-passed before it is weighed. [Hz]
-#: Farther away the filter passes e^(−2π 6 Hz · sin(π/8) · 2 s). [s]
-HEARD = 2.0
 RATE = 30.0  #: RunSamples a second that are weighed.
 #: The model's errors are alike for so long: one sample. [s]
 MEMORY = 0.3
@@ -316,21 +313,15 @@ def columns(piece: RunSamples) -> tuple[Indices, Array, Array] | None:
     run, inside = piece.run, np.flatnonzero(piece.inside)
     if inside.size == 0:
         return None
-    n, j = run.robot.joints, np.arange(run.robot.joints)
-    # Of an hour with one free cycle that cycle, and what the filter hears of the rest.
-    step = median_step(run.t)
-    near = round(HEARD / step)
-    first, stop = max(0, int(inside[0]) - near), int(inside[-1]) + near + 1
-    series = (run.t, run.terms.p, run.terms.mu, run.q, run.dq)
-    t, p, mu, q, dq = (values[first:stop] for values in series)
-    at = inside[:: max(1, int(1.0 / (RATE * step)))]
-    used = at - first
+    n, j, t, terms = run.robot.joints, np.arange(run.robot.joints), run.t, run.terms
+    at = inside[:: max(1, int(1.0 / (RATE * run.step)))]
     try:
-        d, speed = (zero_phase(t, x, CUTOFF)[used] for x in (derivative(t, p) - mu, dq))
+        raw = derivative(t, terms.p) - terms.mu
+        d, speed = (zero_phase(t, x, CUTOFF)[at] for x in (raw, run.dq))
     except (ClockError, ValueError):
         return None
-    A = np.zeros((len(used), n, 4 + 2 * n))
-    A[:, :, :4] = load_regressor(run.robot.chain, q[used])
+    A = np.zeros((len(at), n, 4 + 2 * n))
+    A[:, :, :4] = load_regressor(run.robot.chain, run.q[at])
     A[:, j, 4 + j] = np.tanh(speed / SIGN_SPEED)
     A[:, j, 4 + n + j] = 1.0
     return at, d, A
