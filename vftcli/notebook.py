@@ -29,14 +29,21 @@ from vftcli.answering import (
     identified,
     replayed,
 )
-from vftcli.batch.log_work import for_comparison, for_estimates
 from vftcli.bias import RefinementChoice
 from vftcli.doctor.examination import Examination, Examiner, examine
 from vftcli.evaluation import ReferenceChoice
 from vftcli.free_motion import FreeChoice
 from vftcli.identification import Task
 from vftcli.observers import GoalChoice, ObserverChoice
-from vftcli.pipeline import AnalysisChoice, analyse_logs, choice_of, list_touches, prepared
+from vftcli.pipeline import (
+    AnalysisChoice,
+    analyse_logs,
+    choice_of,
+    for_comparison,
+    for_estimates,
+    list_touches,
+    prepared,
+)
 from vftcli.readers.reader import ReadChoice
 from vftcli.readers.reading import Library
 from vftcli.robots import RobotChoice

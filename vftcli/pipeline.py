@@ -124,6 +124,17 @@ def choice_of(
     )
 
 
+def for_estimates(choice: AnalysisChoice) -> AnalysisChoice:
+    """A choice for writing estimates: contacts are listed if `best` runs."""
+    return replace(choice, contacts=choice.contacts and BEST in choice.observers.names)
+
+
+def for_comparison(choice: AnalysisChoice) -> AnalysisChoice:
+    """A choice for errors: contacts are listed for a wrench or a score."""
+    judged = choice.reference is not None and choice.reference.contacts
+    return replace(choice, contacts=choice.contacts and (choice.wrench is not None or judged))
+
+
 def list_touches(log: Run, choice: AnalysisChoice) -> Analysis:
     """The contacts along a log, without any observer's estimate."""
     from vftcli.contacts.listing import list_contacts

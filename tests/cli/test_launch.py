@@ -202,6 +202,25 @@ def test_the_answer_needs_neither_scipy_nor_rerun_and_no_file(command: str, tmp_
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("words", [("report", "--reference", "vendor"), ("estimate",)])
+def test_the_first_lines_come_before_any_observer(words: tuple[str, ...], tmp_path) -> None:
+    """They need the contacts alone; what fails later costs what it fails at."""
+    script = (
+        "import sys, vftcli.pipeline as pipeline\n"
+        "def refuse(*_):\n"
+        "    raise pipeline.VftError(f'no observer; tables: {\"polars\" in sys.modules}')\n"
+        "pipeline.observe = refuse\n"
+        "from vftcli.cli import launch\n"
+        "launch()\n"
+    )
+    command, *more = words
+    done = launched(command, CIRCLE, *more, "-o", "out", begin=("-c", script), cwd=tmp_path)
+    assert "12 contacts. The hardest, at 5.1 s" in done.stdout
+    assert done.returncode == 1
+    assert done.stderr.splitlines()[-1] == "error: no observer; tables: False"
+
+
+@pytest.mark.slow
 def test_a_recording_is_written_without_pandas(tmp_path: Path) -> None:
     """Pyarrow imports it for others wherever it is installed, as beside most notebooks."""
     script = (

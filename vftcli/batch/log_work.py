@@ -21,7 +21,6 @@ from vftcli.analysis import Analysis
 from vftcli.batch.cluster import begin
 from vftcli.doctor.examination import Examiner
 from vftcli.evaluation.references import WRENCH_SCHEMA
-from vftcli.observers.table import BEST
 from vftcli.outputs import PLAIN, OutputChoice
 from vftcli.outputs.batch_folder import BatchFolder
 from vftcli.outputs.believability import grounds, log_line
@@ -178,17 +177,6 @@ def write_result(folder: Path, analysis: Analysis, task: LogTask) -> None:
 
         with OutputFolder(folder, True, CONTACTS) as files:
             put_contacts(files, "", [analysis], task.command)
-
-
-def for_estimates(choice: AnalysisChoice) -> AnalysisChoice:
-    """A choice for writing estimates: contacts are listed if `best` runs."""
-    return replace(choice, contacts=choice.contacts and BEST in choice.observers.names)
-
-
-def for_comparison(choice: AnalysisChoice) -> AnalysisChoice:
-    """A choice for errors: contacts are listed for a wrench or a score."""
-    judged = choice.reference is not None and choice.reference.contacts
-    return replace(choice, contacts=choice.contacts and (choice.wrench is not None or judged))
 
 
 Kinds = dict[str, Any]  #: Column → its type in polars.

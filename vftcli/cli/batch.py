@@ -45,10 +45,11 @@ def batch(
 
     Example: vftcli batch fixtures/ur5_t*.csv --robot ur5 --do estimate -o out
     """
-    from vftcli.batch.log_work import LogJob, for_comparison, for_estimates
+    from vftcli.batch.log_work import LogJob
     from vftcli.batch.run import BatchRun, LogCollection
     from vftcli.doctor.examination import Examiner
     from vftcli.outputs.batch_folder import BatchFolder
+    from vftcli.pipeline import for_comparison, for_estimates
     from vftcli.readers.reading import Library, absolute
     from vftcli.readers.table import listed
     from vftcli.signals.errors import LogError, ParameterError

@@ -103,11 +103,10 @@ def compare(
     Example: vftcli compare fixtures/ur5_circle.csv --robot ur5 --reference zero --interval 0:4
     """
     from vftcli.answering import errors_of
-    from vftcli.batch.log_work import for_comparison
     from vftcli.evaluation.references import judge_jacobian
     from vftcli.outputs.figures import error_figures
     from vftcli.outputs.paper import write_figures
-    from vftcli.pipeline import analyse_logs
+    from vftcli.pipeline import analyse_logs, for_comparison
     from vftcli.readers.reading import Library
     from vftcli.readers.references import jacobian_log
     from vftcli.readers.table import JacobianError

@@ -155,10 +155,9 @@ def estimate(
 
     Example: vftcli estimate fixtures/ur5_circle.csv --robot ur5
     """
-    from vftcli.batch.log_work import for_estimates
+    from vftcli import pipeline
     from vftcli.outputs.estimates import estimate_files, write_estimate_folder
     from vftcli.outputs.files import OutputFolder
-    from vftcli.pipeline import analyse, analysed_in_blocks, comes_in_blocks, prepared, sense
     from vftcli.readers.reading import Library
     from vftcli.readers.references import refuse_estimates
     from vftcli.signals.packages import check_installed
@@ -175,20 +174,20 @@ def estimate(
     choice = opt.choice_for(asked, library)
     # Of a large log only the needed columns are read; outputs show all.
     few = not (choice.lists_contacts or choice.wrench or written.extras)
-    choice = for_estimates(choice)
+    choice = pipeline.for_estimates(choice)
     recording = library.open(log, replace(choice.read, signals=EXAMINED if few else None))
     # Blocks, so that memory does not grow with the log.
-    if set(written.extras) <= {"csv"} and comes_in_blocks(recording, choice):
-        found: Analysis | Iterator[Group] = analysed_in_blocks(recording, choice)
+    if set(written.extras) <= {"csv"} and pipeline.comes_in_blocks(recording, choice):
+        found: Analysis | Iterator[Group] = pipeline.analysed_in_blocks(recording, choice)
     else:
         if not (json or asked.words["details"]):
             choice = replace(choice, answered=show_short)
-        found = analyse(prepared(recording, choice), choice)
+        found = pipeline.analyse(pipeline.prepared(recording, choice), choice)
         if not json:
             if choice.answered is None or found.contacts is None:
                 show_short(found)
             say_analysis(found)
-        found = sense(found, choice)
+        found = pipeline.sense(found, choice)
     made, record = write_estimate_folder(output, found, asked.line, written, force)
     if not json and made is not found:  # of blocks the answer comes at the end
         show_short(made)
