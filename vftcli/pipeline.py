@@ -142,9 +142,16 @@ def list_touches(log: Run, choice: AnalysisChoice) -> Analysis:
     motion = read(log, choice)
     examinations = examine(motion, choice)
     stage(f"{log.name}: listing contacts", 0.3, 1.0)
-    made = Analysis(motion=motion, observers=(), estimates=(), tunings={})
     found = list_contacts(motion).weighed(examinations[0].load, examinations[0].doubts)
-    return replace(made, contacts=found, examinations=examinations)
+    return listed_alone(motion, examinations, found)
+
+
+def listed_alone(
+    motion: FreeMotion, examinations: "tuple[Examination, ...]", found: "ContactList"
+) -> Analysis:
+    """The contacts of a log, before any observer."""
+    none = Analysis(motion=motion, observers=(), estimates=(), tunings={})
+    return replace(none, contacts=found, examinations=examinations)
 
 
 def prepared(recording: Recording, choice: AnalysisChoice) -> Run:
@@ -180,10 +187,7 @@ def analyse(log: Run, choice: AnalysisChoice) -> Analysis:
     stage(f"{name}: looking for free motion", 0.15, 0.25)
     baselines = model(motion, choice)
     # Before the estimates: both of a long log do not fit at once.
-    contacts, unlisted = find_contacts(motion, baselines, examinations[0], choice)
-    known = Analysis(motion=motion, observers=(), estimates=(), tunings={}, contacts=contacts)
-    if choice.answered is not None and contacts is not None:
-        choice.answered(replace(known, examinations=examinations))
+    contacts, unlisted = find_contacts(motion, baselines, examinations, choice)
     stage(f"{name}: running observers", 0.4, 0.5)
     analysis = refine(observe(motion, baselines, choice), baselines, choice)
     remarks = (*analysis.remarks, *unlisted)
@@ -304,7 +308,7 @@ def refine(analysis: Analysis, baselines: "Baselines | None", choice: AnalysisCh
 def find_contacts(
     motion: FreeMotion,
     baselines: "Baselines | None",
-    health: "Examination",
+    examinations: "tuple[Examination, ...]",
     choice: AnalysisChoice,
 ) -> "tuple[ContactList | None, tuple[Remark, ...]]":
     """The contacts, if asked for; None and the reason if unknown."""
@@ -317,9 +321,12 @@ def find_contacts(
         bias = None if baselines is None else baselines.best.correction
         referenced = choice.reference is not None
         found = list_contacts(unloaded_motion(motion, choice), bias, referenced=referenced)
-        return found.weighed(health.load, health.doubts), ()
     except VftError as error:
         return None, (caution("contacts-not-listed", reason=str(error)),)
+    found = found.weighed(examinations[0].load, examinations[0].doubts)
+    if choice.answered is not None:
+        choice.answered(listed_alone(motion, examinations, found))
+    return found, ()
 
 
 def unloaded_motion(motion: FreeMotion, choice: AnalysisChoice) -> FreeMotion:
