@@ -194,8 +194,6 @@ class RunSamples(NamedTuple):
     @property
     def coarse(self) -> "RunSamples":
         """The samples of the coarse run that are means of these alone."""
-        if self.run.coarse is self.run:
-            return self
         whole = block_means(self.inside.astype(float), self.run.blocked) == 1.0
         return RunSamples(self.run.coarse, whole)
 
