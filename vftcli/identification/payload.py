@@ -18,13 +18,7 @@ from vftcli.identification.training import (
 from vftcli.readers.table import listed
 from vftcli.robots.chain import Payload
 from vftcli.robots.friction import SMOOTHING
-from vftcli.robots.kernels import (
-    LINK,
-    chain_parameters,
-    momentum_terms,
-    torque_regressor,
-    usual_errors,
-)
+from vftcli.robots.kernels import momentum_terms, usual_errors
 from vftcli.robots.robot import Robot
 from vftcli.robots.run import Run, RunSamples
 from vftcli.robots.terms import drive_torque, gain_sd, gravity_torque
@@ -207,12 +201,9 @@ def payload_from_pair(first: Recording, second: Recording, robot: Robot) -> Load
 
 def load_friction(robot: Robot, q: Array, sign: Array, x: Array) -> Array:
     """Columns sign(q̇)·(|g with load| − |g without|) per joint. (N, n, n)"""
-    Y = torque_regressor(robot.chain, q, np.zeros_like(q), np.zeros_like(q))
-    phi = chain_parameters(robot.loaded_chain)
-    heavier = phi.copy()
-    heavier[-LINK : -LINK + STATIC] += x
-    growth = abs(Y @ heavier) - abs(Y @ phi)
-    return (growth * sign)[:, :, None] * np.eye(robot.joints)
+    before, zero = gravity_torque(robot, q), np.zeros_like(q)
+    after = before + load_columns(robot, q, zero, zero) @ x
+    return ((abs(after) - abs(before)) * sign)[:, :, None] * np.eye(robot.joints)
 
 
 def find_time_shift(motion: PreparedLog, other: Recording) -> tuple[float, float]:

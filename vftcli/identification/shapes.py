@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vftcli.robots.friction import FRICTION_MODELS, SMOOTHING, bent_line, coulomb_logarithmic
+from vftcli.robots.friction import FRICTION_MODELS, SMOOTHING, friction_torque
 from vftcli.robots.robot import JointFriction
 from vftcli.signals.arrays import Array
 
@@ -116,11 +116,6 @@ def round_digits(value: float, digits: int = 7) -> float:
 
 def term_values(term: str, shape: Shape, dq: Array, load: Array) -> Array:
     """One term at recorded velocities [rad/s] and loads [N·m], its coefficient at 1."""
-    if term in shape.points:
-        torques = np.eye(len(shape.speeds))[shape.points.index(term)].tolist()
-        return bent_line(dq, shape.speeds, torques, smoothing=shape.smoothing)
-    own = ("smoothing", "stribeck_velocity", "logarithmic_velocity")
-    numbers = {name: getattr(shape, name) for name in own}
-    return coulomb_logarithmic(
-        dq, **{"coulomb": 0.0, "logarithmic": 0.0, term: 1.0}, **numbers, load=load
-    )
+    alone = shape._replace(terms=shape.points if term in shape.points else (term,))
+    friction = alone.friction(np.array([own == term for own in alone.terms], float))
+    return friction_torque([friction], dq[:, None], load[:, None])[:, 0]

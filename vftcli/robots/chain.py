@@ -34,8 +34,7 @@ class Payload(Shown):
 
     mass: float  #: Mass. [kg]
     com: Array  #: Centre of mass in flange axes, from the flange origin. (3,) [m]
-    #: Inertia tensor about the centre of mass, in flange axes; a point's is zero.
-    #: (3, 3) [kg·m²]
+    #: Tensor about it, in flange axes; zero for a point. (3, 3) [kg·m²]
     inertia: Array = field(default_factory=lambda: np.zeros((3, 3)))
 
     def __post_init__(self) -> None:

@@ -343,7 +343,7 @@ class Play(NamedTuple):
     """The play operator along a stretch of a log."""
 
     state: Array  #: s, the share of full deflection. (T, n)
-    centre: Array  #: c after the last sample, from which the next stretch goes on. (n,) [rad]
+    centre: Array  #: c after the last sample, for the next stretch. (n,) [rad]
 
 
 def play(q: Array, length: Array | float, centre: Array | None = None) -> Play:
@@ -417,7 +417,7 @@ class RunningFriction:
         load: Array | None = None,
         temperature: Array | None = None,
     ) -> Array:
-        """Friction torque of the next samples, as `friction_torque` has it. (T, n) [N·m]"""
+        """Friction torque of the next samples. (T, n) [N·m]"""
         state = None
         if self._joints:
             found = play(q[:, self._joints], self._length, self.centre)

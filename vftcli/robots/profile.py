@@ -279,7 +279,7 @@ def columns(
     return {name: column(joints, prefix + name) for name in kind.__dataclass_fields__}
 
 
-AGREES = 1e-12  #: Relative difference below which a number of the file counts as unchanged.
+AGREES = 1e-12  #: Relative difference of a number that counts as unchanged.
 
 
 def robot_toml(robot: Robot, heading: Sequence[str] = ()) -> str:

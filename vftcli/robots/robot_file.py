@@ -169,7 +169,7 @@ def weightless(mass: float) -> str:
 
 #: Endings of robot descriptions; what they are their content decides.
 DESCRIPTIONS = (".urdf", ".xml", ".xacro", ".mjcf", ".sdf")
-LARGEST = 16 << 20  #: Largest robot file; one with all its words has a hundredth of it. [B]
+LARGEST = 16 << 20  #: Largest robot file; a long one has a hundredth. [B]
 
 
 class RobotFile:

@@ -98,7 +98,7 @@ class Run(Shown):
 
     @cached_property
     def smooth_dq(self) -> Array:
-        """Joint velocities without their noise: the direction of the path. (T, n) [rad/s]"""
+        """Joint velocities without their noise. (T, n) [rad/s]"""
         return low_pass(self.t, self.dq, min(12.0, 0.2 / self.step))
 
     @cached_property

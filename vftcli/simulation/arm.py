@@ -23,7 +23,7 @@ STIFFNESS = {"stiff": 90.0, "soft": 28.0}
 #: Largest natural frequency times step: beyond it the loop is badly damped or unstable.
 FASTEST_LOOP = 0.4
 WARMING_STEPS = 250  #: Inner steps between two updates of the friction's temperature.
-CHECK_STEPS = 10  #: Inner steps between two looks at whether the arm still moves like an arm.
+CHECK_STEPS = 10  #: Inner steps between two looks for a runaway.
 RUNAWAY = 200.0  #: Joint velocity no arm reaches. [rad/s]
 #: Largest relative deviation: drawn twice as large, it leaves nothing negative.
 LARGEST_SHARE = 0.45
