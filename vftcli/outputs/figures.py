@@ -19,14 +19,10 @@ from vftcli.outputs.charts import INK, Chart, ChartLine, colours_of_names, lines
 from vftcli.outputs.error_tables import block, logs_of
 from vftcli.outputs.files import OutputFolder, write_text
 from vftcli.outputs.page.log_charts import (
-    LOWEST,
-    QUIETEST,
     contact_spans,
+    joint_panels,
     reference_name,
-    response_charts,
-    spectra_chart,
     torque_chart,
-    tuning_chart,
     wrench_chart,
 )
 from vftcli.outputs.paper import (
@@ -52,10 +48,14 @@ if TYPE_CHECKING:
     from vftcli.signals.arrays import Array
 
 #: Every figure that a log may have.
-LOG_FIGURES = ("force", "torque", "errors", "wrench", "spectra", "tuning", "responses")
+LOG_FIGURES = ("force", "torque", "errors", "wrench", "spectra", "tuning")
 TUNED_FIGURES = ("spectra", "tuning")  #: Those beside gains that were found.
 ERROR_FIGURES = ("errors",)  #: The figure of a table of errors.
 MOST = 8  #: Most logs in one figure of errors; more show only their summary.
+#: Gain drawn at -240 dB, so that its logarithm is finite; lowest gain shown. [–], [dB]
+QUIETEST, LOWEST = 1e-12, -80.0
+#: Colours of the two spectra.
+FREE, LOADED = "#3b7ea1", "#c2410c"
 #: Dashes of responses, drawn in black beside coloured spectra.
 BROKEN = ("1.5 2", "8 2 1.5 2", "4 2", "8 2 1.5 2 1.5 2", "12 4", "")
 
@@ -84,20 +84,12 @@ def log_figures(analysis: Analysis) -> dict[str, Drawing]:
         )
     if (refined := analysis.refinement) is not None:
         if (spectra := refined.baselines.plain.spectra) is not None:
-            # One observer's |H|; another figure has all.
+            # One observer's |H|: all would hide one another.
             lead = next((o for o in analysis.observers if o.name == BEST), analysis.observers[0])
             found["spectra"] = spectra_drawing(spectra, {lead.name: lead})
         if refined.curves:
             best = {key: (curve.best, curve.least) for key, curve in refined.curves.items()}
             found["tuning"] = tuning_drawing(refined.curves, best)
-    responses = [plot for chart in response_charts(analysis) for plot in plots_of(chart)]
-    found["responses"] = Drawing(
-        "Gain, phase and delay of the observers, joint 1",
-        # One below the other in one column, side by side in two.
-        lambda width: line_figure(
-            width, responses, columns=len(responses) if width > NARROW else 1
-        ),
-    )
     return found
 
 
@@ -202,11 +194,27 @@ def error_figures(errors: pl.DataFrame) -> dict[str, Drawing]:
     return {"errors": Drawing("RMSE of the external torque with its 95 % interval", draw)}
 
 
+def over_frequency(
+    key: str, title: str, unit: str, x: "Array", lines: Sequence[ChartLine]
+) -> Chart:
+    """A chart over frequency, a panel a joint. (T,) [Hz]"""
+    panels = joint_panels(lines[0].values.shape[1])
+    return Chart(key, title, (unit,) * len(panels), panels, x, tuple(lines), unit="Hz", log=True)
+
+
 def spectra_drawing(spectra: Spectra, observers: Mapping[str, Observer]) -> Drawing:
     """Spectra of free and loaded part, with |H| of these observers."""
-    chart = spectra_chart(spectra)
     frequency = spectra.frequency[1:]
-    lines = []
+    # In decibels; the least number above 0 replaces zero.
+    parts = [
+        ChartLine(name, 10.0 * np.log10(np.maximum(power[1:], np.finfo(float).tiny)), *style)
+        for name, power, style in (
+            ("free part, S_n", spectra.free, (FREE, "")),
+            ("loaded part, S_d", spectra.loaded, (LOADED, "5 2")),
+        )
+    ]
+    title = "Spectrum of the disturbance, dB of 1 (N·m)²/Hz"
+    chart, lines = over_frequency("spectra", title, "dB", frequency, parts), []
     for k, (name, observer) in enumerate(observers.items()):
         response = observer.frequency_response(frequency, spectra.step, spectra.joints)
         gain = 20.0 * np.log10(np.maximum(np.abs(response), QUIETEST))
@@ -226,7 +234,14 @@ def tuning_drawing(
     curves: "Mapping[str, Curve]", chosen: "Mapping[str, tuple[Array, Array]]"
 ) -> Drawing:
     """Expected error over frequency; chosen rates [rad/s] and errors [N·m]."""
-    chart = tuning_chart(curves, lines_of_names(list(curves)))
+    styles = lines_of_names(list(curves))
+    lines = [
+        ChartLine(name, curve.rmse, *styles[name], x=curve.omega_n / (2.0 * np.pi))
+        for name, curve in curves.items()
+    ]
+    x = np.concatenate([line.x for line in lines if line.x is not None])
+    title, ends = "Expected error against natural frequency ω_n/2π", np.array([x.min(), x.max()])
+    chart = over_frequency("curve", title, "N·m", ends, lines)
     marks = {name: (rate / (2.0 * np.pi), least) for name, (rate, least) in chosen.items()}
     plots, below = plots_of(chart), "Natural frequency (Hz)"
     return Drawing(chart.title, partial(line_figure, plots=plots, marks=marks, below=below))

@@ -1,14 +1,12 @@
-"""Charts of one log: torques, wrenches, responses, spectra and tuning."""
+"""Charts of one log: torques, wrenches and force."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
 from vftcli.analysis import Analysis
 from vftcli.contacts.contact_list import Contact, ContactList
-from vftcli.observers.spectra import Spectra
 from vftcli.observers.table import BEST
-from vftcli.observers.tuning import Curve
 from vftcli.outputs.charts import (
     COLOURS,
     REFERENCE,
@@ -22,12 +20,6 @@ from vftcli.outputs.contacts import forces_along
 from vftcli.outputs.error_tables import blocks
 from vftcli.signals.arrays import Z_95, Array
 from vftcli.signals.wrench import AXES, unit_of
-
-FREQUENCIES = 120  #: Points of a frequency response.
-#: Gain drawn at -240 dB, so that its logarithm is finite; lowest gain shown. [–], [dB]
-QUIETEST, LOWEST = 1e-12, -80.0
-#: Colours of the two spectra.
-FREE, LOADED = "#3b7ea1", "#c2410c"
 
 
 def torque_chart(analysis: Analysis) -> Chart:
@@ -100,36 +92,6 @@ def reference_name(analysis: Analysis) -> str:
     return f"reference ({reference.name})" if reference is not None else "reference"
 
 
-def response_charts(analysis: Analysis) -> tuple[Chart, ...]:
-    """Gain, phase and delay of every observer's first joint."""
-    step, n = analysis.recording.median_step, analysis.recording.joints
-    frequency = np.geomspace(1e-2, 0.5 / step, FREQUENCIES)
-    styles, lines = observer_styles(analysis), []
-    for observer in analysis.observers:
-        response = observer.frequency_response(frequency, step, n)[:, :1]
-        # Unwrapped, or a delay would jump where the phase passes −180°.
-        phase = np.degrees(np.unwrap(np.angle(response), axis=0))
-        decibel = 20.0 * np.log10(np.maximum(np.abs(response), QUIETEST))
-        # A phase of −φ degrees at f is a delay of φ / (360 f).
-        delay = -1e3 * phase / (360.0 * frequency[:, None])
-        name, each = observer.name, (decibel, phase, delay)
-        lines.append([ChartLine(name, values, *styles[name]) for values in each])
-    kinds = (("Gain", "dB", LOWEST), ("Phase", "°", None), ("Delay", "ms", None))
-    return tuple(
-        Chart(title.lower(), title, (unit,), (f"{title}, joint 1",), frequency, tuple(own),
-              unit="Hz", log=True, lowest=lowest)
-        for (title, unit, lowest), own in zip(kinds, zip(*lines, strict=True), strict=True)
-    )  # fmt: skip
-
-
-def over_frequency(
-    key: str, title: str, unit: str, x: Array, lines: Sequence[ChartLine]
-) -> Chart:
-    """A chart over frequency, a panel a joint. (T,) [Hz]"""
-    panels = joint_panels(lines[0].values.shape[1])
-    return Chart(key, title, (unit,) * len(panels), panels, x, tuple(lines), unit="Hz", log=True)
-
-
 def joint_panels(joints: int) -> tuple[str, ...]:
     """Names of the panels of a chart with one a joint."""
     return tuple(f"J{j}" for j in range(1, joints + 1))
@@ -186,30 +148,3 @@ def highest(found: ContactList, others: Sequence[ChartLine] = ()) -> float:
         if contact.is_load and (course := contact.course) is not None:
             tops.append(float(np.max(course.force + np.minimum(course.band, course.force))))
     return max(tops) or 1.0
-
-
-def spectra_chart(found: Spectra) -> Chart:
-    """Spectra of the disturbance over both parts of the log."""
-    # In decibels; the least number above 0 replaces zero.
-    lines = [
-        ChartLine(
-            name, 10.0 * np.log10(np.maximum(power[1:], np.finfo(float).tiny)), colour, dash
-        )
-        for name, power, colour, dash in (
-            ("free part, S_n", found.free, FREE, ""),
-            ("loaded part, S_d", found.loaded, LOADED, "5 2"),
-        )
-    ]
-    title = "Spectrum of the disturbance, dB of 1 (N·m)²/Hz"
-    return over_frequency("spectra", title, "dB", found.frequency[1:], lines)
-
-
-def tuning_chart(curves: Mapping[str, Curve], styles: Mapping[str, LineStyle]) -> Chart:
-    """Minimised error of every observer tuned by the log."""
-    lines = tuple(
-        ChartLine(name, curve.rmse, *styles[name], x=curve.omega_n / (2.0 * np.pi))
-        for name, curve in curves.items()
-    )
-    x = np.concatenate([line.x for line in lines if line.x is not None])
-    title, ends = "Expected error against natural frequency ω_n/2π", np.array([x.min(), x.max()])
-    return over_frequency("curve", title, "N·m", ends, lines)
