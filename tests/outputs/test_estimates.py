@@ -96,9 +96,8 @@ def test_what_the_pose_hides_is_apart(analysis: Analysis) -> None:
         assert table["sd/reference/6"].to_list() == rising.tolist()
 
 
-def test_a_long_table_is_written_in_groups_that_hold_the_same(analysis, tmp_path, monkeypatch):
+def test_groups_of_rows_hold_the_same_table(analysis, tmp_path, monkeypatch):
     write_estimates(tmp_path / "whole.parquet", analysis)
-    monkeypatch.setattr("vftcli.outputs.estimates.LONG", 100)
     monkeypatch.setattr("vftcli.outputs.estimates.GROUP_ROWS", 300)
     write_estimates(tmp_path / "groups.parquet", analysis)
     whole, groups = (pl.read_parquet(tmp_path / f"{n}.parquet") for n in ("whole", "groups"))

@@ -11,7 +11,7 @@ import numpy as np
 from vftcli.analysis import Analysis
 from vftcli.outputs import PLAIN, OutputChoice
 from vftcli.outputs.examination import overridden_lines
-from vftcli.outputs.files import SEAL, OutputFolder, numbered, put_table, table_file
+from vftcli.outputs.files import SEAL, OutputFolder, numbered, table_file
 from vftcli.outputs.run_record import run_record, seal
 from vftcli.signals.arrays import Array
 from vftcli.signals.columns import StatedFrame, described_schema
@@ -27,8 +27,7 @@ if TYPE_CHECKING:
 
 #: An analysis and its rows; None for the whole log, after its blocks.
 Group = tuple[Analysis, slice | None]
-#: Least rows of a table written in groups, and rows of such a group.
-LONG, GROUP_ROWS = 1 << 17, 1 << 15
+GROUP_ROWS = 1 << 15  #: Rows of a group of a table.
 
 
 def estimates_table(analysis: Analysis, rows: slice = ALL) -> "pl.DataFrame":
@@ -81,14 +80,9 @@ def wrench_columns(analysis: Analysis, rows: slice) -> Iterator[tuple[str, Array
 
 
 def write_estimates(path: Path, analysis: Analysis) -> None:
-    """Write the table as Parquet, of a long log in groups of rows."""
-    if len(analysis.t) > LONG:
-        starts = range(0, len(analysis.t), GROUP_ROWS)
-        write_groups(path, ((analysis, slice(at, at + GROUP_ROWS)) for at in steps(starts)))
-        return
-    how: Any = {"compression_level": 1, "statistics": False}
-    table, doubts = estimates_table(analysis), doubts_of(analysis)
-    put_table(path, table, frames_of(analysis), metadata=doubts or None, **how)
+    """Write the table as Parquet."""
+    starts = range(0, len(analysis.t), GROUP_ROWS)
+    write_groups(path, ((analysis, slice(at, at + GROUP_ROWS)) for at in steps(starts)))
 
 
 def write_groups(path: Path, groups: Iterable[Group], csv: Path | None = None) -> Analysis:
