@@ -136,7 +136,7 @@ class JointFit(NamedTuple):
     @property
     def friction(self) -> JointFriction:
         """The joint's friction by this fit."""
-        return self.shape.friction(self.fit.values[: len(self.shape.terms)])
+        return self.shape.friction(self.fit.values)
 
     @property
     def at_bound(self) -> tuple[str, ...]:
@@ -345,5 +345,5 @@ def non_negative_fit(shape: Shape, data: JointData) -> tuple[Shape, Array]:
 
 def is_dissipative(shape: Shape, values: Array, speed_limit: float) -> bool:
     """Whether friction never pushes and rises up to a speed. [rad/s]"""
-    friction = shape.friction(values[: len(shape.terms)])
-    return not pushing_terms(shape, values) and np.isnan(falling_speed(friction, speed_limit))
+    falls = falling_speed(shape.friction(values), speed_limit)
+    return not pushing_terms(shape, values) and np.isnan(falls)

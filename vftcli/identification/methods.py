@@ -183,8 +183,7 @@ def identified_friction(
     errors = ", ".join(f"{value:.2g}" for value in sd)
     friction = replace(
         shape.friction(
-            values[: len(shape.terms)],
-            f"identified ({method}) from {logs}; standard deviations {errors}",
+            values, f"identified ({method}) from {logs}; standard deviations {errors}"
         ),
         temperature=before.temperature,
         temperature_at=before.temperature_at,
@@ -292,7 +291,7 @@ def whole_arm(data: Training) -> MethodResult:
         values, sd = x[place], base["sd"].to_numpy()[place.start + behind : place.stop + behind]
         # Beside errors of the links a rise may fall; the joint's own fit does not.
         if not is_dissipative(fit.shape, values, data.top_speed(j)):
-            values = fit.fit.values[: len(fit.shape.terms)]
+            values = fit.fit.values
         frictions[j], more = identified_friction(data, j, fit.shape, values, sd, "base")
         numbers += more
         remarks += check_friction(j, frictions[j], data)

@@ -76,8 +76,8 @@ class Shape(NamedTuple):
         return text
 
     def friction(self, values: Array, confidence: str = "") -> JointFriction:
-        """The joint's friction with these coefficients, one a term."""
-        parameters = {k: round_digits(v) for k, v in zip(self.terms, values, strict=True)}
+        """The joint's friction with these coefficients, which others may follow. (k,)"""
+        parameters = {k: round_digits(v) for k, v in zip(self.terms, values, strict=False)}
         torques = tuple(parameters.pop(term) for term in self.points)
         parameters["smoothing"] = self.smoothing
         for name in ("stribeck_velocity", "logarithmic_velocity", "presliding_length"):

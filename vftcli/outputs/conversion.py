@@ -297,7 +297,7 @@ def save(
                 writers.WRITERS[form](file, run)
             with table_file(folder / truth) as file:
                 writers.write_truth(file, run.truth, run.scenario.sensing.start)
-            folder.write(scenario, to_toml(replace(run.scenario, format=form), run.seed))
+            folder.write(scenario, to_toml(replace(run.scenario, format=form, seed=run.seed)))
             own = {truth, scenario, path.name}
             files = {n: sha for n, sha in folder.digests().items() if n.partition("/")[0] in own}
             about = {

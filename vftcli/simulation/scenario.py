@@ -323,9 +323,9 @@ def convert(value: Any, hint: Any, where: str) -> Any:  # noqa: ANN401 - TOML va
     return section_from(hint, value, where)
 
 
-def to_toml(scenario: Scenario, seed: int) -> str:
+def to_toml(scenario: Scenario) -> str:
     """A scenario as a TOML file that makes the same log again."""
-    return "".join(lines_of(as_table(scenario) | {"seed": seed}))
+    return "".join(lines_of(as_table(scenario)))
 
 
 def as_table(value: Any) -> Any:  # noqa: ANN401 - of a section, what it holds
