@@ -105,21 +105,24 @@ def sense(
         for wanted in (True, False)
     )
     # In base axes --frame moves no zero; beside it the poses of the smoothed estimates.
-    raw, *bare = slow_wrenches(log, (disturbance, *to_smooth))
+    raw, *slow = slow_wrenches(log, (disturbance, *to_smooth))
     mounting, fitted = find_mounting(log.recording, log.robot, disturbance, choice)
-    vendor = vendor_remarks(log.recording, raw, chain)
     sensor = VirtualSensor(solver=choice.by_pose, frame=choice.frame, mounting=mounting)
     spans, unloaded = zero_spans(choice.zero, raw)
+    raw = resampled(raw, t)
+    vendor = vendor_remarks(log.recording, raw, chain)
     chosen, free = within(t, spans), within(t, unloaded)
     hidden, sigma = raw.hidden, raw.sigma_min
     del disturbance, raw  # of a long log each takes the room of an estimate
-    log.recording.release()
+    log.spare()
     sds, on_sds = torque_error(choice.torque_sd, log, observers, estimates, chosen)
-    names, plain = [wrench.name for wrench in bare], plain or as_modelled(motion)
+    names, plain = [wrench.name for wrench in slow], plain or as_modelled(motion)
     smoothed = smooth_all(names, plain, own or {}, unloaded=chosen, gate=gate)
     by_pose = sensor.wrenches(others, q, chain, sds) if others else ()
     made = {wrench.name: wrench for wrench in by_pose}
-    made |= {w.name: smoothed_wrench(smoothed[w.name], w, sensor, log) for w in bare}
+    made |= {
+        w.name: smoothed_wrench(smoothed[w.name], resampled(w, t), sensor, log) for w in slow
+    }
     wrenches = [made[torque.name] for torque in estimates]
     bands = [remark for name in names for remark in made[name].remarks]
     # Remarks on torques' errors name the torques, if some are smoothed.
@@ -155,28 +158,28 @@ def sense(
 
 
 def slow_wrenches(log: Run, torques: Sequence[ExternalTorque]) -> tuple[Wrench, ...]:
-    """Wrenches in base axes of torques that change little in a sample of the coarse run."""
+    """Wrenches of slow torques in base axes, on the clock of the coarse run."""
     chain, coarse, sensor = log.robot.chain, log.coarse, VirtualSensor(frame="base")
-    if coarse is log:
-        return sensor.wrenches(torques, log.q, chain)
     means = (block_means(torque.tau, log.blocked) for torque in torques)
     slow = [
         ExternalTorque(name=torque.name, t=coarse.t, tau=mean)
         for torque, mean in zip(torques, means, strict=True)
     ]
-    return tuple(resampled(wrench, log.t) for wrench in sensor.wrenches(slow, coarse.q, chain))
+    return sensor.wrenches(slow, coarse.q, chain)
 
 
 def resampled(wrench: Wrench, t: Array) -> Wrench:
     """A wrench without a band, interpolated to times t (T,) [s]."""
+    if wrench.t is t:
+        return wrench
     sigma, left = (
-        None if x is None else np.interp(t, wrench.t, x)
+        None if x is None else handed_over(np.interp(t, wrench.t, x))
         for x in (wrench.sigma_min, wrench.null_space)
     )
     return replace(
         wrench,
         t=t,
-        values=resample_columns(t, wrench.t, wrench.values),
+        values=handed_over(resample_columns(t, wrench.t, wrench.values)),
         sigma_min=sigma,
         masked=np.interp(t, wrench.t, wrench.hidden) > 0.5,
         null_space=left,
