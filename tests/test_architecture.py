@@ -244,14 +244,14 @@ def test_a_file_fits_a_few_screens() -> None:
 
 
 MOST = {
-    "lines of Python": 50_820,
+    "lines of Python": 50_715,
     "files": 210,
-    "functions": 2713,
+    "functions": 2706,
     "functions over 60 lines": 8,
-    "names, operators, numbers": 365_273,
-    "characters a line that is not blank": 50.16,
+    "names, operators, numbers": 364_260,
+    "characters a line that is not blank": 50.13,
     "noqa": 70,
-    "lines of TOML, JavaScript, CSS": 7269,
+    "lines of TOML, JavaScript, CSS": 7265,
 }
 """The size of the package: whoever makes it smaller lowers these, nobody raises them."""
 
