@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 
 from vftcli.bias.whole_log import WholeLogBias
-from vftcli.contacts.windows import contact_lanes, smooth_lanes
+from vftcli.contacts.windows import LEAST_IN_MOTION, MARGIN, contact_lanes, smooth_lanes
 from vftcli.free_motion.free_motion import FreeLoad, FreeMotion, FreePart, free_load, without_load
 from vftcli.observers.paper import MomentumObserver
 from vftcli.observers.spectra import looks_free, spectra_of
@@ -34,9 +34,11 @@ from vftcli.signals.rest import NEAR_REST, REST, faster, slower
 from vftcli.wrench.model_error import (
     DRY_SHARE,
     LEAST_ERROR,
+    ErrorProcess,
     TorqueNoise,
     error_process,
     infer_noise,
+    innovations,
     learn_noise,
 )
 from vftcli.wrench.smoother import (
@@ -267,3 +269,29 @@ def self_test(free: FreeStatistics, prior: WrenchPrior) -> Array:
     if not shares:
         return np.ones(6)
     return np.maximum(np.quantile(np.concatenate(shares), 0.95, axis=0) / Z_95, 1.0)
+
+
+def listed_force(free: FreeStatistics, log: BlockLog, least: float, untold: Mask) -> float:
+    """The force with which 95 % of trial pushes at the flange would be listed. [N]
+
+    Each lasts `PSEUDO`, somewhere in the log, in any direction. Without it the model error
+    explains its torque: evidence ½F² Σν²/S, ν of 1 N. At rest F_c must give way first.
+    """
+    blocks, process = log
+    count = len(blocks.t)
+    edge, long = (round(seconds / free.seconds) for seconds in (MARGIN, PSEUDO))
+    starts = np.linspace(0, max(count - long, 0), MOST_PSEUDO).astype(int)
+    number = np.arange(-edge, long + edge)[:, None]
+    at, inside = np.clip(starts + number, 0, count - 1), (number >= 0) & (number < long)
+    middle = at[len(at) // 2]
+    rests, chain = blocks.rests[middle], free.log.robot.loaded_chain
+    axes = np.linalg.qr(np.random.default_rng(0).normal(size=(MOST_PSEUDO, 3, 3)))[0]
+    torque = axes @ flange_jacobian(chain, blocks.q[middle])[:, :3]
+    decay, added, *others = (x[at, None].repeat(3, axis=2) for x in process)
+    added[0] /= np.maximum(1.0 - decay[0] ** 2, 1e-9)
+    process = ErrorProcess(decay, added, *others)
+    square, _ = innovations(inside[..., None, None] * torque, process)
+    limit = np.where((rests | ~untold).all(axis=1), least, LEAST_IN_MOTION)
+    force = np.sqrt(2.0 * limit[:, None] / square.sum(axis=(0, 3)))
+    held = (rests * free.noise.dry)[:, None] / np.maximum(abs(torque), 1e-9)
+    return float(np.quantile(np.maximum(force, held.min(axis=2)), 0.95))

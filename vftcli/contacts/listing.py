@@ -19,13 +19,12 @@ from vftcli.contacts.contact_list import (
     numbered,
 )
 from vftcli.contacts.free_statistics import (
-    MOST_PSEUDO,
-    PSEUDO,
     SETTLED,
     FreeStatistics,
     free_part,
     free_statistics,
     inferred_statistics,
+    listed_force,
     observed,
 )
 from vftcli.contacts.rows import (
@@ -40,11 +39,9 @@ from vftcli.contacts.search import Candidates, search
 from vftcli.contacts.windows import (
     LEAST_EVIDENCE,
     LEAST_IN_MOTION,
-    MARGIN,
     places,
 )
 from vftcli.free_motion.free_motion import FreeMotion
-from vftcli.robots.chain import flange_jacobian
 from vftcli.robots.run import Run
 from vftcli.signals.arrays import Array, Mask, covered
 from vftcli.signals.errors import ParameterError
@@ -52,7 +49,7 @@ from vftcli.signals.progress import passed
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Where, caution, on_joints
 from vftcli.signals.rest import MOVES, REST, faster
-from vftcli.wrench.model_error import ErrorProcess, error_process, innovations
+from vftcli.wrench.model_error import error_process
 from vftcli.wrench.smoother import (
     DRIVES,
     BlockLog,
@@ -146,7 +143,7 @@ def by_smoother(free: FreeStatistics, *, proven: bool) -> ContactList:
     if len(groups) < len(rows):
         measurement = ContactMeasurement.of(measurement.found.joined(groups), free)
         rows = measured_rows(free, measurement)
-    smallest = listed_force(free, found, least, untold)
+    smallest = listed_force(free, found.log, least, untold)
     shown = np.array([shows_force(row, smallest) for row in rows], bool)
     if not named and shown.any():
         rows = measured_rows(free, replace(measurement, tail=TAIL))
@@ -225,32 +222,6 @@ def rests_around(run: Run, found: Candidates, span: BlockSpan, joints: Mask) -> 
     first, last = run.t.searchsorted([t[span[0]] - AROUND, t[span[1] - 1] + AROUND])
     speed = abs(run.dq[first:last, joints])
     return bool(len(speed) and np.quantile(speed, 0.95, axis=0).max(initial=0.0) < MOVES)
-
-
-def listed_force(free: FreeStatistics, found: Candidates, least: float, untold: Mask) -> float:
-    """The force with which 95 % of trial pushes at the flange would be listed. [N]
-
-    Each lasts `PSEUDO`, somewhere in the log, in any direction. Without it the model error
-    explains its torque: evidence ½F² Σν²/S, ν of 1 N. At rest F_c must give way first.
-    """
-    blocks, process = found.log
-    count = len(blocks.t)
-    edge, long = (round(seconds / free.seconds) for seconds in (MARGIN, PSEUDO))
-    starts = np.linspace(0, max(count - long, 0), MOST_PSEUDO).astype(int)
-    number = np.arange(-edge, long + edge)[:, None]
-    at, inside = np.clip(starts + number, 0, count - 1), (number >= 0) & (number < long)
-    middle = at[len(at) // 2]
-    rests, chain = blocks.rests[middle], free.log.robot.loaded_chain
-    axes = np.linalg.qr(np.random.default_rng(0).normal(size=(MOST_PSEUDO, 3, 3)))[0]
-    torque = axes @ flange_jacobian(chain, blocks.q[middle])[:, :3]
-    decay, added, *others = (x[at, None].repeat(3, axis=2) for x in process)
-    added[0] /= np.maximum(1.0 - decay[0] ** 2, 1e-9)
-    process = ErrorProcess(decay, added, *others)
-    square, _ = innovations(inside[..., None, None] * torque, process)
-    limit = np.where((rests | ~untold).all(axis=1), least, LEAST_IN_MOTION)
-    force = np.sqrt(2.0 * limit[:, None] / square.sum(axis=(0, 3)))
-    held = (rests * free.noise.dry)[:, None] / np.maximum(abs(torque), 1e-9)
-    return float(np.quantile(np.maximum(force, held.min(axis=2)), 0.95))
 
 
 def false_rows(free: FreeStatistics) -> int:

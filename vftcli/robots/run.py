@@ -13,7 +13,7 @@ from vftcli.readers.table import listed
 from vftcli.robots.friction import dry_friction
 from vftcli.robots.robot import Robot
 from vftcli.robots.terms import TIE, drive_torque, dynamics_terms
-from vftcli.signals.arrays import Array, Mask, block_means, handed_over, median_step
+from vftcli.signals.arrays import Array, Mask, handed_over, median_step
 from vftcli.signals.errors import RobotError
 from vftcli.signals.external_torque import DynamicsTerms
 from vftcli.signals.filters import low_pass
@@ -183,6 +183,13 @@ class Run(Shown):
             trim()
         if (steadied := vars(self).get("steadied", self)) is not self:
             steadied.spare(*others)
+
+
+def block_means(x: Array, count: int) -> Array:
+    """Means of so many rows each, without the rows of a last broken block. (T', …)"""
+    whole = len(x) // count * count
+    total = sum((x[k:whole:count] for k in range(1, count)), start=x[:whole:count])
+    return handed_over(total / count)
 
 
 class RunSamples(NamedTuple):

@@ -201,13 +201,6 @@ def resample_columns(at: Array, t: Array, x: Array, outside: float | None = None
     return out
 
 
-def block_means(x: Array, count: int) -> Array:
-    """Means of so many rows each, without the rows of a last broken block. (T', …)"""
-    whole = len(x) // count * count
-    total = sum((x[k:whole:count] for k in range(1, count)), start=x[:whole:count])
-    return handed_over(total / count)
-
-
 def runs_of(mask: Mask) -> list[tuple[int, int]]:
     """First sample of each run of true ones, and the one behind its last."""
     # With a false sample at either end every run has both its edges.

@@ -19,9 +19,9 @@ from vftcli.free_motion.free_motion import FreeLoad, FreeMotion, within, without
 from vftcli.observers.observer import Observer
 from vftcli.observers.spectra import error_band, free_error, spectra_of
 from vftcli.robots.chain import link_poses
-from vftcli.robots.run import Run, RunSamples
+from vftcli.robots.run import Run, RunSamples, block_means
 from vftcli.robots.terms import disturbance_impulse
-from vftcli.signals.arrays import Array, Mask, block_means, handed_over, resample_columns
+from vftcli.signals.arrays import Array, Mask, handed_over, resample_columns
 from vftcli.signals.errors import ParameterError, ReferenceTorqueError
 from vftcli.signals.external_torque import DynamicsTerms, ExternalTorque
 from vftcli.signals.option import numbers
