@@ -244,9 +244,9 @@ def test_a_file_fits_a_few_screens() -> None:
 
 
 MOST = {
-    "lines of Python": 50_715,
+    "lines of Python": 50_717,
     "files": 210,
-    "functions": 2706,
+    "functions": 2707,
     "functions over 60 lines": 8,
     "names, operators, numbers": 364_260,
     "characters a line that is not blank": 50.13,

@@ -91,6 +91,11 @@ class AnalysisChoice:
         return asked or self.refinement.corrects_all or self.observers.from_spectra
 
     @property
+    def is_plain(self) -> bool:
+        """Whether no option can be refused once the contacts are known."""
+        return self.wrench is None and self.observers.of_robot_file
+
+    @property
     def lists_contacts(self) -> bool:
         """Whether contacts are listed, from the complete log."""
         return self.contacts and not self.observers.causal

@@ -57,8 +57,7 @@ def report(
     library, written = Library(logs), opt.outputs_of(asked)
     output, details = opt.folder_of(output, logs, asked), asked.words["details"]
     published = asked.of(PrintChoice).table
-    labels = map(library.label, logs)
-    names = report_files(labels, written.extras, figures, several=len(logs) > 1)
+    names = report_files(map(library.label, logs), written.extras, figures, several=len(logs) > 1)
     OutputFolder(output, force, names).check()
     choice = opt.choice_for(asked, library, on_screen=not json)
     if published is not None:
@@ -67,7 +66,7 @@ def report(
         check_published(published, asked.words["reference"])
         choice = replace(choice, observers=choice.observers.beside_print())
     # One of several logs may lack a wrench; details need it all.
-    if len(logs) == 1 and not (json or details):
+    if len(logs) == 1 and not (json or details) and choice.is_plain:
         choice = replace(choice, answered=show_first_lines)
     left_out, analyses = LeftOut(library, logs), []
     for made in analyse_logs(logs, choice, left_out.add):
@@ -80,7 +79,7 @@ def report(
     failed = left_out.reasons
     several = len(analyses) + len(failed) > 1
     if not json:  # the answer first, even if writing fails
-        show_answers(analyses, failed, details=details, several=several)
+        show_answers(analyses, failed, details=details, begun=choice.answered is not None)
     from vftcli.outputs.report import write_report
 
     stage("writing", WRITING, 1.0)
@@ -108,7 +107,7 @@ def show_first_lines(made: "Analysis") -> None:
 
 
 def show_answers(
-    analyses: "Sequence[Analysis]", failed: Mapping[str, str], *, details: bool, several: bool
+    analyses: "Sequence[Analysis]", failed: Mapping[str, str], *, details: bool, begun: bool
 ) -> None:
     """Print the screen, or what follows its first lines; with details every table too."""
     from vftcli.outputs.error_tables import to_terminal
@@ -122,12 +121,12 @@ def show_answers(
         logs_screen,
     )
 
-    if several:
+    if len(analyses) + len(failed) > 1:
         show(logs_screen(analyses, canvas(), failed, every=details))
     else:
         (made,) = analyses
         text = log_screen(made, canvas(), most=MOST_LINES - FILE_LINES, every=details)
-        is_begun = made.contacts is not None and not details
+        is_begun = begun and made.contacts is not None
         show(text.removeprefix(first_lines(made, canvas()) if is_begun else ""))
     for made in analyses:
         say_analysis(made)
@@ -180,7 +179,7 @@ def estimate(
     if set(written.extras) <= {"csv"} and pipeline.comes_in_blocks(recording, choice):
         found: Analysis | Iterator[Group] = pipeline.analysed_in_blocks(recording, choice)
     else:
-        if not (json or asked.words["details"]):
+        if not (json or asked.words["details"]) and choice.is_plain:
             choice = replace(choice, answered=show_short)
         found = pipeline.analyse(pipeline.prepared(recording, choice), choice)
         if not json:

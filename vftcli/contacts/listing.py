@@ -119,8 +119,7 @@ def by_smoother(free: FreeStatistics, *, proven: bool) -> ContactList:
     run, named, seconds = free.log, free.basis == "free motion", free.seconds
     found = search(run, free.noise, free.level, seconds)
     t = found.log.blocks.t
-    middle = [span.mean() for span in found.spans]
-    own = found.best[free.own[np.searchsorted(run.t, middle)]]
+    own = found.best[free.own[run.t.searchsorted([span.mean() for span in found.spans])]]
     least = max(LEAST_EVIDENCE, FALSE_MARGIN * own.max(initial=-np.inf))
     inner = (t >= t[0] + AT_ENDS) & (t <= t[-1] - AT_ENDS)
     found = found.kept([k for k, (a, b) in enumerate(found.runs) if inner[a:b].any()])

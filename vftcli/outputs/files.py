@@ -75,13 +75,14 @@ def check_file(path: Path, force: bool = False) -> None:
 
 @contextmanager
 def table_file(path: Path) -> Iterator[Path]:
-    """Yield a path at which Polars writes a table."""
+    """Yield a path at which Polars or Arrow writes a table."""
     from polars.exceptions import ComputeError
 
     try:
         yield path
-    except ComputeError as error:
-        why = re.sub(r".*IO error: | \(os error \d+\)", "", " ".join(str(error).split())[:200])
+    except (ComputeError, OSError) as error:
+        around = r".*IO error: |.*\[[Ee]rrno \d+\] | \(os error \d+\)"
+        why = re.sub(around, "", " ".join(str(error).split())[:200])
         raise unwritable(Path(path.name), OSError(why)) from None
 
 

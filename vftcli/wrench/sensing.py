@@ -160,10 +160,9 @@ def sense(
 def slow_wrenches(log: Run, torques: Sequence[ExternalTorque]) -> tuple[Wrench, ...]:
     """Wrenches of slow torques in base axes, on the clock of the coarse run."""
     chain, coarse, sensor = log.robot.chain, log.coarse, VirtualSensor(frame="base")
-    means = (block_means(torque.tau, log.blocked) for torque in torques)
     slow = [
-        ExternalTorque(name=torque.name, t=coarse.t, tau=mean)
-        for torque, mean in zip(torques, means, strict=True)
+        ExternalTorque(name=torque.name, t=coarse.t, tau=block_means(torque.tau, log.blocked))
+        for torque in torques
     ]
     return sensor.wrenches(slow, coarse.q, chain)
 
