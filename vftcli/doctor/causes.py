@@ -306,12 +306,14 @@ def chosen(case: Case, found: Sequence[Cause]) -> Diagnosis:
     """The cause that leaves least, if that is little, and the next."""
 
     def explains(cause: Cause) -> bool:
-        limit = SLIGHT if cause.code == "effort-offset" else EXPLAINED
-        little = cause.misfit < limit * case.misfit and (
+        less = cause.misfit < EXPLAINED * case.misfit
+        if cause.code == "effort-offset":  # it is there at rest, too
+            less = cause.case.best.size < SLIGHT * case.best.size
+        little = less and (
             case.misfit > OPEN
             or cause.code in ON_JOINTS
             # No errors of a rough description explain as much.
-            or cause.misfit < EVIDENT * case.rough.size / case.size
+            or cause.misfit < EVIDENT * case.left_by(case.rough)
         )
         return cause.misfit <= OPEN and (little or is_plain(case, cause))
 

@@ -227,7 +227,7 @@ def is_rather(other: RobotMatch, own: RobotMatch, diagnosis: Diagnosis) -> bool:
     # What a load explains is no other arm's.
     healed, load = diagnosis.healed, diagnosis.healed.loaded
     fit = load if 0 < load.values[0] < HEAVY else healed.best
-    return other.fits and other.misfit < share * fit.size / healed.size
+    return other.fits and other.misfit < share * healed.left_by(fit)
 
 
 def explained(diagnosis: Diagnosis, robots: Sequence[RobotMatch]) -> Iterator[Remark]:

@@ -36,6 +36,8 @@ GRAVITY = [0, 3, 6]
 SIMPSON = np.array([1.0, 4.0, 1.0]) / 6  #: Their weights in the mean.
 SLOW = 0.01  #: Speed at which dry friction has its direction. [rad/s]
 FAST = 0.8  #: Mean direction of a window in which a joint moves.
+#: Windows of motion that suffice; at rest dry friction may be anything.
+ENOUGH = 20
 #: Prior mass [kg] and first moment [kg·m] of a load.
 LOAD = np.array([5.0, 0.5, 0.5, 0.5])
 ROUGH = 2.0  #: Errors of a rough description's links, in usual errors.
@@ -97,11 +99,16 @@ def solve(target: Array, *by: Terms) -> RobustFit:
         used &= ~wrong
         values[wrong] = 0.0
         rest = target - columns @ values
-        left = np.einsum("wn,wn->w", rest, rest)
-        kept = left <= np.sort(left)[int(KEPT * (len(left) - 1))]
+        kept = without_contact(rest)
     sd = np.zeros(len(used))
     sd[used] = np.sqrt(np.diag(inverse()) * OVERLAP * np.mean(rest[kept] ** 2))
     return RobustFit(values, sd, rest, kept)
+
+
+def without_contact(rest: Array) -> Mask:
+    """Windows with the least of the torque left over (W, n) [N·m]. (W,)"""
+    left = np.einsum("wn,wn->w", rest, rest)
+    return np.asarray(left <= np.sort(left)[int(KEPT * (len(left) - 1))])
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -314,7 +321,16 @@ class Case:
     @property
     def misfit(self) -> float:
         """Share of the logged effort left unexplained; loads and contacts are not."""
-        return self.best.size / self.size
+        return self.left_by(self.best)
+
+    def left_by(self, fit: RobustFit) -> float:
+        """Share of the logged effort that a fit leaves over: of all windows or of motion.
+
+        Contact may fill the one, dry friction of any direction the rest between.
+        """
+        moving = fit.rest[(abs(self.windows.motion[:, 0]) > FAST).any(axis=1)]
+        kept = moving[without_contact(moving)] if len(moving) >= ENOUGH else fit.rest[fit.kept]
+        return min(fit.size, root_mean_square(kept)) / self.size
 
     @cached_property
     def effort_sizes(self) -> Array:
