@@ -244,12 +244,12 @@ def test_a_file_fits_a_few_screens() -> None:
 
 
 MOST = {
-    "lines of Python": 50_717,
+    "lines of Python": 50_694,
     "files": 210,
     "functions": 2707,
     "functions over 60 lines": 8,
-    "names, operators, numbers": 364_260,
-    "characters a line that is not blank": 50.13,
+    "names, operators, numbers": 364_020,
+    "characters a line that is not blank": 50.11,
     "noqa": 70,
     "lines of TOML, JavaScript, CSS": 7265,
 }

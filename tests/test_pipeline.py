@@ -48,6 +48,44 @@ def asked(
     return AnalysisChoice(robot=RobotChoice(name=str(robot)), **more)  # type: ignore[arg-type]
 
 
+def touched(log: object, robot: str) -> list[Remark]:
+    """Remarks of errors against "nobody touches" that something touched the arm."""
+    found = analyse_log(log, asked(robot, "zero", "gmo", contacts=False))
+    assert found.reference is not None
+    assert not found.reference.tau.any()
+    return [r for r in found.reference.remarks if r.code == "reference-zero-touched"]
+
+
+def test_errors_against_zero_name_the_longest_span_without_contact() -> None:
+    """60 N on the flange, twice in 4 s of free motion, as the current that they take."""
+    free, arm = vft.read(FIXTURE).between(0.0, 4.0), vft.load_robot("ur5")
+    assert touched(free, "ur5") == []
+    current, J = free.require("current").copy(), flange_jacobian(arm.chain, free.q)
+    for start, stop in ((0.5, 1.0), (3.3, 3.6)):
+        on = (free.t > start) & (free.t < stop)
+        current[on] -= J[on, 2] * 60.0 / arm.torque_constant
+    (remark,) = touched(replace(free, current=current), "ur5")
+    assert remark.values["spans"] == 2
+    # A tenth of a second about each: the list's windows and the rounding of the span.
+    assert remark.values["begin_s"] == pytest.approx(1.0, abs=0.21)
+    assert remark.values["end_s"] == pytest.approx(3.3, abs=0.21)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "count"),
+    [
+        ("free_14harm.csv", 0),
+        ("jointwise_2.csv", 0),
+        ("load_14harm.csv", 0),
+        ("push_pose.csv", 1),
+    ],
+)
+def test_hands_and_no_loads_are_seen_in_real_logs(name: str, count: int, logs: Path) -> None:
+    log = reading.read(logs / "ur10e" / name, columns=UR10E)
+    assert len(touched(log, "ur10e")) == count
+
+
 def test_a_run_is_made_once_for_a_recording_and_a_robot() -> None:
     circle, arm, choice = vft.read(FIXTURE), vft.load_robot("ur5"), AnalysisChoice()
     first = pipeline.run_of(circle, arm, choice)

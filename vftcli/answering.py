@@ -9,12 +9,21 @@ from vftcli.admittance import ControlChoice, released_robot
 from vftcli.analysis import Analysis
 from vftcli.identification import Task
 from vftcli.observers import LOG_GAINS, GoalChoice, ObserverChoice
-from vftcli.pipeline import AnalysisChoice, analyse, check_logged, examine, model, prepared, read
+from vftcli.pipeline import (
+    AnalysisChoice,
+    analyse,
+    check_logged,
+    examine,
+    model,
+    prepared,
+    read,
+    touches,
+)
 from vftcli.readers.references import estimates_columns
 from vftcli.robots.run import Run
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.option import FILE, Asked
-from vftcli.signals.recording import EFFORTS, Recording, refuse_repeated_logs
+from vftcli.signals.recording import Recording, refuse_repeated_logs
 from vftcli.signals.remarks import Remark, Where, caution, fact
 from vftcli.wrench import WrenchChoice
 
@@ -81,17 +90,16 @@ def touched(run: Run, choice: AnalysisChoice) -> tuple[Remark, ...]:
         ParameterError: If it shows contact plainly, without `anyway`.
     """
     from vftcli.contacts.thresholds import SETTLING
-    from vftcli.evaluation.references import PLAIN, touches
 
-    known = touches(run) if set(EFFORTS) & set(run.recording.signals) else ()
-    found = [touch for touch in known if touch.stop > run.t[0] + SETTLING]
+    listed = touches(run, choice)
+    rows = listed.contacts if listed else ()
+    found = [row for row in rows if row.stop > run.t[0] + SETTLING]
     if not found:
         return ()
-    worst = max(found, key=lambda touch: touch.excess)
-    where = Where(run.name, (worst.joint + 1,), (worst.start, worst.stop))
-    sizes = {"torque_Nm": worst.torque, "quiet_Nm": worst.quiet}
-    remark = caution("free-log-touched", where, count=len(found), **sizes)
-    if worst.excess > PLAIN and not choice.examiner.anyway:
+    worst = max(found, key=lambda row: (row.trust != "weak", row.peak_force or 0.0))
+    where = Where(run.name, span=(worst.start, worst.stop))
+    remark = caution("free-log-touched", where, size=worst.size, count=len(found))
+    if worst.trust != "weak" and not choice.examiner.anyway:
         raise ParameterError(
             f"{remark}. Give motion that nobody touches, a part of this log with --interval, or "
             "take it all with --anyway"

@@ -151,6 +151,14 @@ def list_touches(log: Run, choice: AnalysisChoice) -> Analysis:
     return listed_alone(motion, examinations, found)
 
 
+def touches(log: Run, choice: AnalysisChoice) -> "ContactList | None":
+    """The contacts along a log, None where none can be listed."""
+    try:
+        return list_touches(log, choice).contacts
+    except VftError:
+        return None
+
+
 def listed_alone(
     motion: FreeMotion, examinations: "tuple[Examination, ...]", found: "ContactList"
 ) -> Analysis:
@@ -401,6 +409,8 @@ def judge(analysis: Analysis, choice: AnalysisChoice) -> Analysis:
     reference, errors, sensed = references.judge(
         analysis.motion, analysis.estimates, sensed, choice.reference, known
     )
+    if choice.reference.name == "zero" and (found := touches(analysis.motion.log, choice)):
+        reference = replace(reference, remarks=(*reference.remarks, *found.not_free(analysis.t)))
     analysis = replace(analysis, reference=reference, errors=errors)
     if sensed is not None:
         analysis = replace(analysis, virtual_sensor=sensed)

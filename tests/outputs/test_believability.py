@@ -92,8 +92,8 @@ def listed(*rows: Contact, **changed: object) -> dict[str, object]:
 
 
 TOUCHED = warning(
-    "reference-zero-touched", Where(joints=(6,), span=(8.5, 8.7)), torque_Nm=7.0, quiet_Nm=0.8,
-    spans=2, begin_s=8.7, end_s=18.6,
+    "reference-zero-touched", Where(span=(8.5, 8.7)), size="7 ± 3 N", spans=2,
+    begin_s=8.7, end_s=18.6,
 )  # fmt: skip
 ZERO = ExternalTorque(name="zero", t=np.arange(600.0), tau=np.zeros((600, 6)), remarks=(TOUCHED,))
 OTHER = warning("other-robot", own="ur5 30 %", best="ur5e 1 %", robot="ur5e")

@@ -9,7 +9,7 @@ import numpy as np
 
 from vftcli.signals.arrays import Array, seal
 from vftcli.signals.parsing import counted
-from vftcli.signals.remarks import Remark, caution
+from vftcli.signals.remarks import Remark, Where, caution, warning
 from vftcli.signals.rest import faster
 from vftcli.signals.shown import UNKNOWN, Shown, joined, record, value_text
 
@@ -106,7 +106,7 @@ class Contact(Shown):
     def _headline(self) -> str:
         kind = "load" if self.is_load else "contact"
         when = f"{self.start:.2f} to {self.stop:.2f} s"
-        return f"{self.number}, a {kind}: {when}, {self._size}, {self.where} ({self.trust})"
+        return f"{self.number}, a {kind}: {when}, {self.size}, {self.where} ({self.trust})"
 
     def _rows(self) -> Iterator[Sequence[object]]:
         yield "field", "value"
@@ -115,7 +115,7 @@ class Contact(Shown):
             yield key, UNKNOWN if shown == "" else shown
 
     @property
-    def _size(self) -> str:
+    def size(self) -> str:
         """|F| at the peak with its band or range; joint torques without a force."""
         if self.peak_force is None:
             return f"{joined(self.joint_torque)} N·m"
@@ -277,14 +277,14 @@ class ContactList(Shown):
 
     def _headline(self) -> str:
         listed, hardest = counted(len(self), "contact"), self.hardest
-        last = f", the hardest {hardest._size} at {hardest.peak:.2f} s" if hardest else ""
+        last = f", the hardest {hardest.size} at {hardest.peak:.2f} s" if hardest else ""
         return f"of {self.recording}: {listed} in {self.duration:.4g} s{last}"
 
     def _rows(self) -> Iterator[Sequence[object]]:
         yield "#", "from – to [s]", "|F| at its peak", "force x y z [N]", "where", "trust"
         for c in self.contacts:
             force = UNKNOWN if c.wrench is None else " ".join(f"{f:.0f}" for f in c.wrench[:3])
-            yield c.number, f"{c.start:.2f} – {c.stop:.2f}", c._size, force, c.where, c.trust
+            yield c.number, f"{c.start:.2f} – {c.stop:.2f}", c.size, force, c.where, c.trust
 
     def to_polars(self) -> "pl.DataFrame":
         """One row a contact, the columns of ``contacts.csv``, units in their names."""
@@ -324,6 +324,24 @@ class ContactList(Shown):
         )
         remarks = (*self.remarks, caution("no-wrench-of-few-joints"))
         return replace(self, contacts=rows, candidates=weak, smallest_force=None, remarks=remarks)
+
+    def not_free(self, t: Array) -> Iterator[Remark]:
+        """A warning if a log (T,) [s] that should be free is not, with its longest free span."""
+        if (hardest := self.hardest) is None:
+            return
+        inner = (time for row in self.contacts for time in (row.start, row.stop))
+        edges = [t[0], *inner, t[-1]]
+        spans = zip(edges[::2], edges[1::2], strict=True)
+        begin, end = max(spans, key=lambda span: span[1] - span[0])
+        yield warning(
+            "reference-zero-touched",
+            Where(span=(hardest.start, hardest.stop)),
+            size=hardest.size,
+            spans=len(self),
+            # Inwards, so that the span holds no contact.
+            begin_s=np.ceil(10.0 * begin) / 10.0,
+            end_s=np.floor(10.0 * end) / 10.0,
+        )
 
     @property
     def tells_untouched(self) -> bool:

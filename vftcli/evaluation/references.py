@@ -26,8 +26,7 @@ from vftcli.readers.reader import RawLog
 from vftcli.readers.references import JacobianLog, read_reference
 from vftcli.robots.chain import flange_jacobian, link_poses
 from vftcli.robots.robot import Robot
-from vftcli.robots.run import Run
-from vftcli.signals.arrays import Z_95, Array, resample_columns, runs_of
+from vftcli.signals.arrays import Z_95, Array, resample_columns
 from vftcli.signals.errors import (
     MissingSignalError,
     ParameterError,
@@ -35,10 +34,9 @@ from vftcli.signals.errors import (
     VftError,
 )
 from vftcli.signals.external_torque import ExternalTorque
-from vftcli.signals.filters import low_pass
 from vftcli.signals.option import interval_text
 from vftcli.signals.recording import Recording
-from vftcli.signals.remarks import Remark, Where, caution, fact, warning
+from vftcli.signals.remarks import Remark, caution, fact
 from vftcli.signals.wrench import AXES, Wrench, WrenchFrame
 from vftcli.wrench import WrenchChoice, ZeroChoice
 from vftcli.wrench.detection import ContactScore, KnownContacts, judge_contacts
@@ -210,83 +208,6 @@ def unloaded(log: JacobianLog, values: Array, zero: ZeroChoice) -> Array:
 
 
 AHEAD = 1.05  #: Least ratio of the paper's error to the best's in a remark.
-#: Cutoff of the open torque: pushes last, reversals do not. [Hz]
-CUTOFF = 2.0
-#: Multiple of a joint's median open torque that stands for contact: free UR10e logs reach
-#: more on joints with friction missed for a moment (13.8), but below their dry friction;
-#: logs of hands, and simulated pushes, reach 17–100.
-STANDING_OUT = 8.0
-#: Multiple of a joint's dry friction that friction may leave open: free UR10e logs reach
-#: 1.15, logs of hands 1.8–7.
-OF_FRICTION = 1.5
-#: No contact below this: link torques leave 1.8 open. [N·m]
-LEAST = 2.0
-#: Multiple of its limit above which open torque is no model error: a free UR10 reaches
-#: 1.14, hands and pushes 2.1 and more.
-PLAIN = 1.5
-SHORTEST = 2.0  #: Shorter logs have no quiet level. [s]
-
-
-class ShownContact(NamedTuple):
-    """A contact seen in a log."""
-
-    joint: int  #: The joint that shows it most, from zero.
-    start: float  #: When it begins. [s]
-    stop: float  #: When it ends. [s]
-    torque: float  #: The largest torque that is open. [N·m]
-    quiet: float  #: The joint's quiet level. [N·m]
-    excess: float  #: The largest torque that is open, over its limit.
-
-
-def touches(run: Run) -> tuple[ShownContact, ...]:
-    """Contacts seen in a log, in order of time; unseen ones may exist.
-
-    The torque that the model leaves open is low-passed and compared with its own quiet
-    level: missed friction spreads over a log, a contact is short.
-    """
-    recording, robot = run.recording, run.robot
-    # Unmodelled motor friction hides contact and looks like one.
-    unknown = robot.torque_source == "current" and not robot.friction
-    if unknown or recording.dq is None or recording.duration < SHORTEST:
-        return ()
-    cutoff = min(CUTOFF, 0.2 / recording.median_step)
-    open_torque = low_pass(run.t, run.model_torque - run.drive_torque, cutoff)
-    level = abs(open_torque - np.median(open_torque, axis=0))
-    quiet = np.median(level, axis=0)
-    limit = np.maximum(np.maximum(STANDING_OUT * quiet, OF_FRICTION * run.dry_friction), LEAST)
-    found = []
-    for start, stop in runs_of(np.asarray((level > limit).any(axis=1))):
-        excess = (level[start:stop] / limit).max(axis=0)
-        j = int(np.argmax(excess))
-        sizes = float(level[start:stop, j].max()), float(quiet[j]), float(excess[j])
-        found.append(ShownContact(j, float(run.t[start]), float(run.t[stop - 1]), *sizes))
-    return tuple(found)
-
-
-def touched_remarks(run: Run) -> tuple[Remark, ...]:
-    """A warning on contact in a supposedly free log, with its longest free span.
-
-    It may be friction as well: the user's word counts.
-    """
-    found = touches(run)
-    if not found:
-        return ()
-    worst = max(found, key=lambda touch: touch.torque / max(touch.quiet, LEAST))
-    t = run.recording.t
-    edges = [
-        float(t[0]),
-        *(x for touch in found for x in (touch.start, touch.stop)),
-        float(t[-1]),
-    ]
-    spans = list(zip(edges[::2], edges[1::2], strict=True))
-    begin, end = max(spans, key=lambda span: span[1] - span[0])
-    values = {
-        "torque_Nm": worst.torque, "quiet_Nm": worst.quiet, "spans": len(found),
-        # Inwards, so that the span holds no contact.
-        "begin_s": np.ceil(10.0 * begin) / 10.0, "end_s": np.floor(10.0 * end) / 10.0,
-    }  # fmt: skip
-    where = Where(joints=(worst.joint + 1,), span=(worst.start, worst.stop))
-    return (warning("reference-zero-touched", where, **values),)
 
 
 class ReferenceLoad(NamedTuple):
@@ -323,9 +244,8 @@ def make_reference(
     remark = caution(f"reference-{name}")
     if name == "sensor":
         return load_of(logged_wrench(log, robot.chain, mounting), log, robot, name, remark)
-    touched = touched_remarks(motion.log) if name == "zero" else ()
     tau = np.zeros(log.q.shape) if name == "zero" else log.require("tau_ext")
-    return ReferenceLoad(ExternalTorque(name=name, t=log.t, tau=tau, remarks=(remark, *touched)))
+    return ReferenceLoad(ExternalTorque(name=name, t=log.t, tau=tau, remarks=(remark,)))
 
 
 def file_reference(

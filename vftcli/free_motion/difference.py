@@ -353,17 +353,19 @@ def error_model(
     )
     low = signal_edge(step) if cutoff is None else signal_edge(step, cutoff)
 
-    def slope_noise() -> Array:
-        momentum = at(known, motion.momentum - pair.of_free("momentum"))
-        return noise_below(t, momentum, moving, step, (low, 2.0 * low), low, slope=1)
-
     motion_error = pair.cached(
         "motion", low, lambda: local_rms(low_pass(t, at(known, pair.model_difference), low), step)
     )
     missed, own = np.maximum(LEAST_SHARE, pair.misfit), np.zeros(len(noise))
     if not corrected:
         # The model's torque differentiates momenta: their noise is no motion.
-        missed, own = np.ones(len(noise)), pair.cached("slope", low, slope_noise)
+        momentum, band = at(known, motion.momentum - pair.of_free("momentum")), (low, 2.0 * low)
+        missed, own = (
+            np.ones(len(noise)),
+            pair.cached(
+                "slope", low, lambda: noise_below(t, momentum, moving, step, band, low, slope=1)
+            ),
+        )
     at_rest = pair.standing.all(axis=1)
     sd = np.full_like(pair.stopped, np.nan)
     for j, stopped in enumerate(pair.stopped.T):

@@ -131,17 +131,14 @@ def spread(values: Sequence[float | None]) -> str:
     if not known:
         return DASH
     each = float(np.mean(known)), min(known), max(known)
-    text, low, high = map(short_number, each)
+    text, low, high = (
+        minus(f"{value:.0f}" if value == round(value) else significant(value)) for value in each
+    )
     if low != high:
         text += f" ({low} … {high})"
     if len(known) < len(values):
         text += f", {len(known)} of {len(values)}"
     return text
-
-
-def short_number(value: float) -> str:
-    """Three significant digits; a whole number as it is."""
-    return minus(f"{value:.0f}" if value == round(value) else significant(value))
 
 
 def item_grid(item: PaperItem) -> Grid:
