@@ -178,12 +178,16 @@ def test_a_hundred_logs_are_one_screen(without_reference: Analysis, as_if) -> No
     assert lines[23:25] == ["", "Can it be believed?"]
 
 
-def test_several_logs_tell_their_errors_where_there_is_a_reference(analysis: Analysis) -> None:
-    lines = logs_screen([listed(analysis, 1), listed(analysis, 1)], CANVAS, {}).splitlines()
+def test_several_logs_tell_their_errors_where_there_is_a_reference(
+    analysis: Analysis, as_if
+) -> None:
+    log = named(analysis, "log.csv", as_if)
+    lines = logs_screen([log, log], CANVAS, {}).splitlines()
     (block,) = blocks(analysis.errors)
-    least = next(iter(block.means.errors.values()))
-    assert lines[3].split()[-3:] == ["above", "RMSE", "health"]
-    assert f" 6 N  {least:.1f} N·m  △ " in lines[4]
+    name, least = block.means.least
+    assert lines[2].split() == ["detects", "mean", "RMSE"]
+    assert lines[3].split()[-3:] == ["above", "[N·m]", "health"]
+    assert f" 6 N  {least:.2f} ({name})  △ " in lines[4]
 
 
 def test_only_paths_that_exist_are_printed(tmp_path: Path, monkeypatch) -> None:

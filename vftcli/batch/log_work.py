@@ -23,7 +23,7 @@ from vftcli.doctor.examination import Examiner
 from vftcli.evaluation.references import WRENCH_SCHEMA
 from vftcli.outputs import PLAIN, OutputChoice
 from vftcli.outputs.batch_folder import BatchFolder
-from vftcli.outputs.believability import grounds, log_line
+from vftcli.outputs.believability import log_line
 from vftcli.outputs.examination import rate_of
 from vftcli.outputs.files import digest
 from vftcli.pipeline import Analyser, AnalysisChoice, analyse, list_touches, prepared
@@ -194,6 +194,7 @@ OF_LOG: Kinds = {
     "hardest_N": Float64,
     "hardest_band_N": Float64,
     "hardest_s": Float64,
+    "hardest_anywhere_N": pl.List(Float64),
     "detectable_N": Float64,
 }
 #: An estimate and its size: root mean square, and 99 % quantile of |τ̂|.
@@ -230,36 +231,15 @@ def rows_of(analysis: Analysis, key: str) -> pl.DataFrame:
         rows = rows.join(errors, on=JOINED, maintain_order="left_right", **order)  # type: ignore[arg-type]
     if rows.is_empty():
         rows = pl.DataFrame({"observer": [None]})
-    facts = {"key": key, **log_facts(analysis)}
-    rows = rows.with_columns(pl.lit(facts[n], SCHEMA[n]).alias(n) for n in facts)
-    return pl.concat([empty, rows], how="diagonal_relaxed").select(*SCHEMA)
-
-
-def log_facts(analysis: Analysis) -> dict[str, Any]:
-    """Facts of a log as a whole, by the names of `OF_LOG`."""
-    recording, found = analysis.recording, analysis.contacts
-    line = log_line(analysis, grounds(analysis))
     codes = [f.code for one in analysis.examinations[:1] for f in one.warnings]
-    facts: dict[str, Any] = {
-        "robot": line.robot,
-        "samples": recording.samples,
-        "duration_s": line.duration,
-        "rate_hz": rate_of(recording),
-        "health": line.standing,
-        "reason": line.words,
+    facts = log_line(analysis)._asdict() | {
+        "key": key,
+        "samples": analysis.recording.samples,
+        "rate_hz": rate_of(analysis.recording),
         "findings": list(dict.fromkeys(codes)),
     }
-    if found is None:
-        return facts
-    hardest = found.hardest
-    return facts | {
-        "contacts": len(found.contacts),
-        "load": any(contact.is_load for contact in found.contacts),
-        "hardest_N": None if hardest is None else hardest.peak_force,
-        "hardest_band_N": None if hardest is None else hardest.peak_band,
-        "hardest_s": None if hardest is None else hardest.peak,
-        "detectable_N": found.detectable_force,
-    }
+    rows = rows.with_columns(pl.lit(facts[n], SCHEMA[n]).alias(n) for n in ("key", *OF_LOG))
+    return pl.concat([empty, rows], how="diagonal_relaxed").select(*SCHEMA)
 
 
 def estimate_sizes(analysis: Analysis) -> Iterator[dict[str, Any]]:

@@ -26,7 +26,7 @@ from vftcli.batch.log_work import (
 from vftcli.outputs.batch_folder import MARKER, BatchFolder
 from vftcli.outputs.believability import LogSummary
 from vftcli.outputs.files import SEAL
-from vftcli.outputs.page.pages import batch_lines, render_batch
+from vftcli.outputs.page.pages import batch_lines, render_logs
 from vftcli.outputs.run_record import envelope, versions
 from vftcli.readers.opening import files_of, open_log
 from vftcli.readers.reader import ALL, ReadChoice
@@ -41,6 +41,7 @@ DESCRIPTION = 1 << 20
 FEWEST = 3  #: Numbers in a row: time, a position, an effort.
 SMALL = 300_000  #: Logs of fewer bytes share a task. [B]
 TOGETHER = 64  #: At most so many.
+BELOW = "Every number is in batch.parquet."  #: Below the table of a batch's page.
 SHARES = 8  #: Least groups of a worker, so that all end at about one time.
 
 
@@ -192,6 +193,7 @@ class BatchRun:
             schema=dict.fromkeys(("log", "key", "stage", "error", "line"), pl.String),
             orient="row",
         )
+        failed = {self.labels[n]: f"{f.line} ({f.stage}, {f.type})" for n, f in ends}
         done = len(finished) - self.before
         count = BatchCount(len(self.logs), self.before, done, len(self.failures))
         # A report is a log's own page.
@@ -204,7 +206,7 @@ class BatchRun:
                 lines.extend(batch_lines(piece, pages))
                 yield piece
 
-        page, record = lambda: render_batch(lines, failures), self.record(count)
+        page, record = lambda: render_logs(lines, failed, below=BELOW), self.record(count)
         self.folder.put_gathered(noted(), failures, page, record)
         return failures, count
 

@@ -6,7 +6,7 @@ same items.
 """
 
 from collections.abc import Iterator, Sequence
-from typing import Literal, NamedTuple
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
 
@@ -14,9 +14,19 @@ from vftcli.analysis import Analysis
 from vftcli.contacts.contact_list import Contact
 from vftcli.doctor.examination import REFUSING, in_words
 from vftcli.doctor.fit import RobotMatch
-from vftcli.outputs.contacts import answer, hardest_words
+from vftcli.outputs import Record
+from vftcli.outputs.contacts import answer
 from vftcli.outputs.examination import command, path_of
-from vftcli.outputs.grid import DASH, percent
+from vftcli.outputs.grid import (
+    DASH,
+    Column,
+    Entry,
+    at_least_shown,
+    banded,
+    percent,
+    ranged,
+    significant,
+)
 from vftcli.robots import PROFILES
 from vftcli.robots.friction import dry_friction
 from vftcli.signals.arrays import Mask
@@ -24,6 +34,9 @@ from vftcli.signals.parsing import counted
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, sentence
 from vftcli.signals.rest import slower
+
+if TYPE_CHECKING:
+    import polars as pl
 
 #: Subject → its findings; any other is about the drives' effort.
 SUBJECTS = {
@@ -79,24 +92,63 @@ class Ground(NamedTuple):
 
 
 class LogSummary(NamedTuple):
-    """One log among several: a line of the screen, the index or a batch's page."""
+    """One log among several; its fields up to `detectable_N` are columns of a batch's table."""
 
-    name: str
+    log: str  #: Its label.
     robot: str
-    duration: float  #: Its length. [s]
-    contacts: str  #: Their number, "load" or a dash.
-    hardest: str  #: The hardest contact in words, or a dash.
-    force: float  #: Its force, 0 without one. [N]
-    least: float | None  #: Least visible force, None if unknown. [N]
-    standing: Standing  #: Health of the log.
-    words: str
+    duration_s: float
+    health: Standing
+    reason: str  #: Its worst ground, or "sound".
+    contacts: int | None = None  #: Their number, None where none are listed.
+    load: bool | None = None  #: Whether one of them is a load.
+    hardest_N: float | None = None
+    hardest_band_N: float | None = None  #: Half width of its 95 % band.
+    hardest_s: float | None = None  #: Time of its peak.
+    #: Its smallest and largest size where that depends on an unknown place.
+    hardest_anywhere_N: tuple[float, float] | None = None
+    detectable_N: float | None = None  #: Least visible force, None if unknown.
+    error: str = DASH  #: The least mean RMSE and its observer. [N·m]
     page: str = ""  #: Its own page, relative to that of all logs; "" without one.
-    error: str = DASH  #: The least mean RMSE and its observer, or a dash.
+    grounds: tuple[Ground, ...] = ()
 
     @property
     def rank(self) -> tuple[int, float]:
         """Sort key: the worst health first, then the hardest contact."""
-        return SEVERITY.index(self.standing), -self.force
+        return SEVERITY.index(self.health), -(self.hardest_N or 0.0)
+
+    @property
+    def hardness(self) -> tuple[bool, float]:
+        """Sort key: known size first, then force."""
+        force, band = self.hardest_N or 0.0, self.hardest_band_N or 0.0
+        return force > band and self.hardest_anywhere_N is None, force
+
+    @property
+    def hardest(self) -> str:
+        """The hardest contact in a few words."""
+        if self.hardest_N is None:
+            return DASH
+        ends, (known, _) = self.hardest_anywhere_N, self.hardness
+        size = ranged(*ends) if ends else banded(self.hardest_N, self.hardest_band_N)
+        text = f"{size} at {self.hardest_s:.1f} s"
+        return text if known else f"unknown ({text})"
+
+    def row(self, **entries: Entry) -> Record:
+        """Entries by the keys of `LOG_COLUMNS`, some as given."""
+        count = "load" if self.load else self.contacts
+        return self._asdict() | {"contacts": count, "hardest": self.hardest} | entries
+
+
+#: Field of a log's summary → its column in the table of several logs.
+LOG_COLUMNS = {
+    "log": "log",
+    "robot": "robot",
+    "duration_s": Column("span", form="{:.1f} s".format, seldom=True),
+    "contacts": Column("contacts"),
+    "hardest": "hardest",
+    "detectable_N": Column("detects above", form=at_least_shown, seldom=True),
+    "error": Column("mean RMSE", "N·m"),
+    "health": "health",
+}
 
 
 def headline(analysis: Analysis) -> str:
@@ -116,25 +168,46 @@ def headline(analysis: Analysis) -> str:
     return text
 
 
-def log_line(analysis: Analysis, found: Sequence[Ground]) -> LogSummary:
-    """One log's line, by its grounds, without page and error."""
-    listed, recording, worst = analysis.contacts, analysis.recording, health(found)
-    count, hardest, most = DASH, DASH, None
-    if listed is not None:
-        load = any(contact.is_load for contact in listed.contacts)
-        count = "load" if load else str(len(listed.contacts))
-        hardest, most = hardest_words(listed), listed.hardest
-    return LogSummary(
+def log_line(analysis: Analysis, page: str = "") -> LogSummary:
+    """One log among several."""
+    recording, listed, found = analysis.recording, analysis.contacts, grounds(analysis)
+    worst = health(found)
+    line = LogSummary(
         recording.name,
         analysis.robot.name,
         recording.duration,
-        count,
-        hardest,
-        (most and most.peak_force) or 0.0,
-        None if listed is None else listed.detectable_force,
         worst.standing,
         "sound" if worst.standing == "good" else f"{worst.subject}: {worst.sentence}",
+        error=least_error(analysis.errors),
+        page=page,
+        grounds=found,
     )
+    if listed is None:
+        return line
+    line = line._replace(
+        contacts=len(listed.contacts),
+        load=any(contact.is_load for contact in listed.contacts),
+        detectable_N=listed.detectable_force,
+    )
+    if (hardest := listed.hardest) is None:
+        return line
+    return line._replace(
+        hardest_N=hardest.peak_force,
+        hardest_band_N=hardest.peak_band,
+        hardest_s=hardest.peak,
+        hardest_anywhere_N=hardest.anywhere if hardest.place_unknown else None,
+    )
+
+
+def least_error(errors: "pl.DataFrame | None") -> str:
+    """The least mean RMSE and its observer. [N·m]"""
+    if errors is None:
+        return DASH
+    # Polars takes a tenth of the time of a list without a reference.
+    from vftcli.evaluation.errors import joint_means
+
+    least = joint_means(errors).least
+    return DASH if least is None else f"{significant(least[1])} ({least[0]})"
 
 
 def grounds(analysis: Analysis) -> tuple[Ground, ...]:

@@ -138,14 +138,6 @@ def force_size(contact: Contact) -> str:
     return ranged(*apart) if apart else banded(contact.peak_force, contact.peak_band)
 
 
-def hardest_words(found: ContactList) -> str:
-    """The hardest contact of a log in a few words."""
-    if (contact := found.hardest) is None:
-        return DASH
-    size = f"{force_size(contact)} at {contact.peak:.1f} s"
-    return size if contact.size_known else f"unknown ({size})"
-
-
 def direction(force: Array) -> str:
     """A force's direction in words: its main axes, the largest first."""
     u = force / max(float(np.linalg.norm(force)), 1e-12)

@@ -10,6 +10,7 @@ import polars as pl
 from vftcli.analysis import Analysis
 from vftcli.outputs import NONE, PLAIN, OutputChoice, Record
 from vftcli.outputs import error_tables as tables
+from vftcli.outputs.believability import log_line
 from vftcli.outputs.contacts import contacts_csv, contacts_latex, contacts_record
 from vftcli.outputs.estimates import (
     CONTACT_TABLE,
@@ -43,7 +44,7 @@ def write_report(
     All files are written or none. Returns the text of `run.json`, of several logs one record
     with theirs in it.
     """
-    from vftcli.outputs.page.pages import render_index
+    from vftcli.outputs.page.pages import render_logs
 
     labels, several = [a.recording.name for a in analyses], len(analyses) + len(failed) > 1
     pages = list(zip(places_of(labels), analyses, strict=True))
@@ -55,7 +56,8 @@ def write_report(
             fill(folder, f"{place}/", analysis, command, choice, form)
             for place, analysis in steps(pages)
         ]
-        folder.write("index.html", render_index(pages, failed))
+        lines = [log_line(analysis, f"{place}/index.html") for place, analysis in pages]
+        folder.write("index.html", render_logs(lines, failed, analyses))
         errors = put_errors(folder, "", analyses)
         put_contacts(folder, "", analyses, command)
         if form is not None and errors is not None:

@@ -14,9 +14,12 @@ import numpy as np
 from vftcli.analysis import Analysis
 from vftcli.contacts.contact_list import Contact, ContactList
 from vftcli.doctor.examination import doubt
+from vftcli.outputs import Record
 from vftcli.outputs.believability import (
+    LOG_COLUMNS,
     MARKS,
     Ground,
+    LogSummary,
     Standing,
     grounds,
     headline,
@@ -34,11 +37,8 @@ from vftcli.outputs.contacts import (
 from vftcli.outputs.examination import rate_of, refused_codes
 from vftcli.outputs.grid import (
     DASH,
-    Column,
-    Grid,
     GridCell,
-    Rows,
-    at_least_shown,
+    keyed_grid,
     percent,
     significant,
     terminal,
@@ -283,64 +283,56 @@ def logs_screen(
     every: bool = False,
 ) -> str:
     """The screen of several logs: one line a log, then the worst findings."""
-    found = [(analysis, grounds(analysis)) for analysis in analyses]
-    arms = dict.fromkeys(analysis.robot.name for analysis in analyses)
+    lines = [log_line(analysis) for analysis in analyses]
     free = dict.fromkeys(r.recording.name for a in analyses for r in a.motion.runs)
-    left_out = f"{len(failed)} left out" if failed else ""
-    source = f"free motion from {', '.join(free)}" if free else ""
-    parts = (f"{len(analyses) + len(failed)} logs", " and ".join(arms), left_out, source)
-    lines = [canvas.painted(printable(" · ".join(filter(None, parts))), "bold"), ""]
-    shown = found
-    if not every and len(found) > MOST_LOGS:
+    parts = (
+        f"{len(lines) + len(failed)} logs",
+        " and ".join(dict.fromkeys(line.robot for line in lines)),
+        f"{len(failed)} left out" if failed else "",
+        f"free motion from {', '.join(free)}" if free else "",
+    )
+    texts = [canvas.painted(printable(" · ".join(filter(None, parts))), "bold"), ""]
+    shown = lines
+    if not every and len(lines) > MOST_LOGS:
         # The worst and hardest, in the order of the logs.
-        ranks = sorted(range(len(found)), key=lambda k: log_line(*found[k]).rank)
-        shown = [found[k] for k in sorted(ranks[:MOST_LOGS])]
-    lines += [f"  {line}" for line in log_table(shown, failed, canvas)]
-    if len(shown) < len(found):
-        lines.append(f"  the {len(shown)} worst and hardest of {len(found)}; --details shows all")
+        ranks = sorted(range(len(lines)), key=lambda k: lines[k].rank)
+        shown = [lines[k] for k in sorted(ranks[:MOST_LOGS])]
+    texts += [f"  {text}" for text in log_table(shown, failed, canvas)]
+    if len(shown) < len(lines):
+        texts.append(f"  the {len(shown)} worst and hardest of {len(lines)}; --details shows all")
     findings = [
-        (ground, analysis.recording.name)
+        (ground, line.log)
         for standing in ("bad", "caution")
-        for analysis, each in found
-        for ground in each
+        for line in lines
+        for ground in line.grounds
         if ground.of_log and ground.standing == standing
     ]
     if findings:
-        lines += ["", "Can it be believed?"]
+        texts += ["", "Can it be believed?"]
         for ground, name in findings if every else findings[:WORST]:
-            lines += ground_lines(ground, canvas, None if every else 2, name)
+            texts += ground_lines(ground, canvas, None if every else 2, name)
         if len(findings) > WORST and not every:
-            lines.append(f"  and {len(findings) - WORST} more: --details")
-    return canvas.shown("\n".join(lines)) + "\n"
+            texts.append(f"  and {len(findings) - WORST} more: --details")
+    return canvas.shown("\n".join(texts)) + "\n"
 
 
 def log_table(
-    found: Sequence[tuple[Analysis, tuple[Ground, ...]]],
-    failed: Mapping[str, str],
-    canvas: Canvas,
+    lines: Sequence[LogSummary], failed: Mapping[str, str], canvas: Canvas
 ) -> list[str]:
     """One line a log: its contacts and its health."""
-    judged = any(analysis.errors is not None for analysis, _ in found)
-    span, rest = Column("span", seldom=True), Column("detects above", seldom=True)
-    heads = ("log", span, Column("contacts"), "hardest", rest, *[Column("RMSE")] * judged)
-    lines: list[tuple[Sequence[str], Standing, str]] = []
-    for analysis, all_grounds in found:
-        line, listed, least = log_line(analysis, all_grounds), analysis.contacts, DASH
-        if line.least is not None and listed is not None and listed.tells_untouched:
-            least = at_least_shown(line.least)
-        leading = leading_block(analysis)
-        errors = [] if leading is None else [*leading.means.errors.values()]
-        error = f"{significant(errors[0], 2)} N·m" if errors else DASH
-        row = (line.name, f"{line.duration:.1f} s", line.contacts, line.hardest, least, error)
-        state = "sound" if line.standing == "good" else health(all_grounds).subject
-        lines.append((row[: len(heads)], line.standing, state))
-    lines += [((name, *[""] * (len(heads) - 1)), "bad", "left out") for name in failed]
-    # The last entry of a line is in its colour.
-    rows: Rows = [
-        (*row, GridCell("", mark=canvas.painted(canvas.shown(f"{MARKS[how]} {state}"), how)))
-        for row, how, state in lines
-    ]
-    return terminal(Grid((*heads, "health"), rows), canvas.shown, 2).splitlines()
+
+    def painted(how: Standing, state: str) -> GridCell:
+        return GridCell("", mark=canvas.painted(canvas.shown(f"{MARKS[how]} {state}"), how))
+
+    left = {"robot"} if any(line.error != DASH for line in lines) else {"robot", "error"}
+    columns = {key: column for key, column in LOG_COLUMNS.items() if key not in left}
+    rows = list[Record]()
+    for line in lines:
+        state = "sound" if line.health == "good" else health(line.grounds).subject
+        rows.append(line.row(health=painted(line.health, state)))
+    empty, out = dict.fromkeys(columns, ""), painted("bad", "left out")
+    rows += [empty | {"log": name, "health": out} for name in failed]
+    return terminal(keyed_grid(columns, rows), canvas.shown, 2).splitlines()
 
 
 def force_bars(t: Array, force: Array, contacts: Sequence[Contact], canvas: Canvas) -> list[str]:

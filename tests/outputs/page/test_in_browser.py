@@ -14,9 +14,10 @@ from made_runs import analyse_log
 from test_shapes import sphere
 
 from vftcli.analysis import Analysis
+from vftcli.outputs.believability import log_line
 from vftcli.outputs.charts import Chart, ChartLine
 from vftcli.outputs.page import shell
-from vftcli.outputs.page.pages import render, render_index
+from vftcli.outputs.page.pages import render, render_logs
 from vftcli.outputs.page.shell import HERE, part
 from vftcli.outputs.page.stage import HEIGHT, WIDTH, arrow_of, pose_at, view_of
 from vftcli.outputs.shapes import capsules
@@ -636,7 +637,7 @@ def test_a_long_log_reads_and_keeps_its_extremes(opened: Callable) -> None:
 
 
 def test_the_index_sorts(opened: Callable, pushed: Analysis, without_reference: Analysis) -> None:
-    tab = opened(render_index([("a", pushed), ("b", without_reference)]), 400)
+    tab = opened(render_logs([log_line(pushed), log_line(without_reference)]), 400)
     assert tab.errors == []
     assert tab.overflow <= 0
     head = tab.page.locator(".sorts thead th").nth(2)  # the span: 20.0 and 5.2 s

@@ -8,23 +8,20 @@ from contact_rows import contact, contact_list
 from unpacking import Page, page_data
 
 from vftcli.analysis import Analysis
-from vftcli.batch.log_work import SCHEMA
+from vftcli.batch.log_work import SCHEMA, rows_of
 from vftcli.contacts.contact_list import OF_FORCES
-from vftcli.outputs.believability import MARKS, Ground
+from vftcli.outputs.believability import MARKS, Ground, LogSummary, log_line
 from vftcli.outputs.contacts import contact_grid
 from vftcli.outputs.page import pages
 from vftcli.outputs.page.log_charts import force_chart
 from vftcli.outputs.page.pages import (
     batch_lines,
     contact_details,
-    index_headline,
-    index_line,
     joint_values,
+    logs_headline,
     model_pairs,
-    overview,
     render,
-    render_batch,
-    render_index,
+    render_logs,
 )
 from vftcli.outputs.page.shell import part
 from vftcli.outputs.run_record import run_record
@@ -239,7 +236,6 @@ def test_the_wrench_of_a_row_is_force_moment_mean_and_impulse() -> None:
 
 
 LINE = {"robot": "ur5", "duration_s": 20.0, "joint": 1, "observer": "gmo", "load": False}
-FAILURES = {"log": pl.String, "stage": pl.String, "error": pl.String, "line": pl.String}
 
 
 def table(*rows: dict[str, object]) -> pl.DataFrame:
@@ -254,74 +250,93 @@ BAD = {"log": "b<i>.csv", "health": "bad", "reason": "effort: turned", "contacts
 
 
 def test_the_index_links_every_report(pushed: Analysis, without_reference: Analysis) -> None:
-    reports = [("a b", pushed), ('"><script>', without_reference)]
-    html = render_index(reports, {"<bad>.csv": "no log"})
+    reports = [pushed, without_reference]
+    pages = ("a b/index.html", '"><script>/index.html')
+    html = render_logs(list(map(log_line, reports, pages)), {"<bad>.csv": "no log"}, reports)
     assert 'href="a%20b/index.html"' in html
     assert 'href="%22%3E%3Cscript%3E/index.html"' in html
     assert '"><script>/' not in html
     assert "RMSE in N·m" in html
-    assert "3 logs · Universal Robots UR5 (CB3)</p>" in html
+    assert "3 logs · ur5</p>" in html
+    assert "1 log could not be analysed" in html
     assert "✗ &lt;bad&gt;.csv is left out: no log" in html
 
 
+def shown(*lines: LogSummary) -> list[list[str]]:
+    """The entries of every log's row on the page, as HTML."""
+    body = render_logs(lines).partition('class="sorts"')[2].partition("</table>")[0]
+    rows = re.findall(r"<tr>\s*(<th scope=\"row\".*?)</tr>", body, re.DOTALL)
+    return [re.findall(r"<t[hd][^>]*>(.*?)</t[hd]>", row, re.DOTALL) for row in rows]
+
+
 def test_a_line_says_how_many_how_hard_and_how_sound(pushed: Analysis) -> None:
-    line = index_line("a b", pushed)
-    log, robot, span, contacts, hardest, least, error, state = overview([line]).rows[0]
-    assert (log.text, robot, span) == ("ur5_circle.csv", "ur5", "20.0 s")
-    assert log.html == '<a href="a%20b/index.html">ur5_circle.csv</a>'
+    line = log_line(pushed, "a b/index.html")
+    ((log, robot, span, contacts, hardest, least, error, state),) = shown(line)
+    assert (robot, span) == ("ur5", "20.0 s")
+    assert log == '<a href="a%20b/index.html">ur5_circle.csv</a>'
     assert (contacts, hardest, least) == ("12", "91 ± 7 N at 5.1 s", "2 N")
-    assert error == "0.273 N·m (best)"  # without J5, which rests
-    assert state.text == f"{MARKS[line.standing]} {line.words}"
-    bad = line._replace(standing="bad", words="load: heavy <b>", name="<i>")
-    (shown,) = overview([bad]).rows
-    assert "load: heavy &lt;b&gt;" in shown[-1].html
-    assert shown[0].html == '<a href="a%20b/index.html">&lt;i&gt;</a>'
-    nothing = index_line("a", replace(pushed, contacts=None, errors=None))
-    assert overview([nothing]).rows[0][3:7] == ("–",) * 4
+    assert error == "0.273 (best)"  # without J5, which rests
+    assert re.sub("<.*?>", "", state) == f"{MARKS[line.health]} {line.reason}"
+    bad = line._replace(health="bad", reason="load: heavy <b>", log="<i>")
+    (row,) = shown(bad)
+    assert "load: heavy &lt;b&gt;" in row[-1]
+    assert row[0] == '<a href="a%20b/index.html">&lt;i&gt;</a>'
+    nothing = log_line(replace(pushed, contacts=None, errors=None))
+    assert shown(nothing)[0][3:7] == ["–"] * 4
+
+
+def test_a_size_that_goes_with_an_unknown_place_is_a_range(pushed: Analysis) -> None:
+    hard = pushed.contacts.hardest
+    ends = caution("size-goes-with-place", least_N=20.0, most_N=248.0)
+    unsure = replace(hard, anywhere=(20.0, 248.0), remarks=(ends,))
+    line = log_line(replace(pushed, contacts=contact_list(unsure)))
+    assert line.hardest == f"unknown (20–248 N at {hard.peak:.1f} s)"
+    rows = rows_of(replace(pushed, contacts=contact_list(unsure)), "k")
+    (told,) = batch_lines(rows.with_columns(log=pl.lit("a.csv")), {})
+    assert told.hardest == line.hardest
+    assert told.hardness == line.hardness == (False, hard.peak_force)
 
 
 def test_the_worst_comes_first(pushed: Analysis) -> None:
-    hard = index_line("b", pushed)._replace(standing="good")
-    lines = [hard._replace(page="a", force=0.0), hard, hard._replace(page="c", standing="bad")]
-    ranked = sorted(lines, key=lambda line: line.rank)
-    assert [line.page for line in ranked] == ["c", "b/index.html", "a"]
-    html = render_index([("first", replace(pushed, contacts=None)), ("second", pushed)])
-    assert html.index("second/index.html") < html.index("first/index.html")
+    hard = log_line(pushed, "b")._replace(health="good")
+    weak = hard._replace(log="a", hardest_N=0.0, page="")
+    rows = shown(weak, hard, hard._replace(log="c", health="bad", page=""))
+    assert [row[0] for row in rows] == ["c", '<a href="b">ur5_circle.csv</a>', "a"]
 
 
 def test_the_headline_counts_logs(pushed: Analysis) -> None:
     quiet = replace(pushed, contacts=replace(pushed.contacts, contacts=()))
     load = replace(pushed.contacts.contacts[0], is_load=True)
     loaded = replace(pushed, contacts=replace(pushed.contacts, contacts=(load,)))
-    title, words = index_headline([pushed, quiet, loaded])
+    title, words = logs_headline([*map(log_line, (pushed, quiet, loaded))])
     assert "1 of 3 logs" in title
     assert "ur5_circle.csv: 91 ± 7 N at 5.1 s. 1 more bears a load" in words
-    assert index_headline([quiet, quiet])[0].startswith("Nothing pushed the arm")
+    assert logs_headline([log_line(quiet)] * 2)[0].startswith("Nothing pushed the arm")
     none = replace(pushed, contacts=None)
-    assert index_headline([none]) == ("External joint torques from 1 logs.", "")
+    assert logs_headline([log_line(none)]) == ("External joint torques from 1 logs.", "")
 
 
 def test_one_line_a_log_the_worst_first_and_what_failed() -> None:
-    failures = pl.DataFrame([("c.csv", "reading", "LogError", "empty")], FAILURES, orient="row")
     rows = table(SOUND | FORCE, SOUND | FORCE | {"joint": 2, "rmse_Nm": 0.75}, BAD)
     lines = list(batch_lines(rows, {"a.csv": "logs/a 1/index.html"}))
     sound, bad = ("a.csv", "ur5", 20.0), ("b<i>.csv", "ur5", 20.0)
     # The mean of both joints, and the force rounded.
     assert lines == [
-        (*sound, "2", "80 ± 6 N at 11.3 s", 80.4, None, "good", "sound", "logs/a 1/index.html",
-         "0.500 N·m (gmo)"),
-        (*bad, "0", "–", 0.0, None, "bad", "effort: turned", "", "–"),
+        (*sound, "good", "sound", 2, False, 80.4, 6.2, 11.3, None, None, "0.500 (gmo)",
+         "logs/a 1/index.html", ()),
+        (*bad, "bad", "effort: turned", 0, False, *[None] * 5, "–", "", ()),
     ]  # fmt: skip
+    assert [line.hardest for line in lines] == ["80 ± 6 N at 11.3 s", "–"]
     wide = FORCE | {"hardest_band_N": 80.4, "load": True, "log": "d.csv", "detectable_N": 4.0}
     (load,) = batch_lines(table(SOUND | wide), {})
-    assert load[3:7] == ("load", "unknown (80 ± 80 N at 11.3 s)", 80.4, 4.0)
-    page = render_batch(lines, failures)
+    assert shown(load)[0][3:6] == ["load", "unknown (80 ± 80 N at 11.3 s)", "4 N"]
+    page = render_logs(lines, {"c.csv": "empty (reading, LogError)"})
     assert page.index("b&lt;i&gt;.csv") < page.index(">a.csv<")
     assert 'href="logs/a%201/index.html"' in page
-    assert "2 logs, 1 of 2 touched." in page
+    assert "<h1>Something pushed the arm in 1 of 2 logs.</h1>" in page
     assert ">3 logs · ur5<" in page
-    assert "1 log could not be analysed." in page
-    assert "LogError" in page
+    assert "1 log could not be analysed" in page
+    assert "c.csv is left out: empty (reading, LogError)" in page
     assert "ariaSort" in page
     none = list(batch_lines(table(SOUND).clear(), {}))
-    assert "0 logs." in render_batch(none, failures)
+    assert "0 logs." in render_logs(none)

@@ -79,8 +79,8 @@ def test_an_option_is_one_word_and_the_text_stays() -> None:
 
 def test_what_a_template_misses_is_an_error_and_none_is_loaded_without_a_page(loaded) -> None:
     assert "jinja2" not in loaded("vftcli.outputs.report")
-    with pytest.raises(UndefinedError, match="words"):
-        page("logs.html", "t", failures=None)
+    with pytest.raises(UndefinedError, match="examinations"):
+        page("logs.html", "t", failed={})
 
 
 @pytest.mark.parametrize("room", [True, False])

@@ -12,11 +12,16 @@ import polars as pl
 
 from vftcli.analysis import Analysis
 from vftcli.contacts.contact_list import ContactList
-from vftcli.evaluation.errors import JointMeans, joint_means
 from vftcli.observers.table import OBSERVERS
 from vftcli.outputs import Record
-from vftcli.outputs.believability import MARKS, LogSummary, grounds, headline, log_line
-from vftcli.outputs.contacts import by_force, hardest_rows, hardest_words, otherwise
+from vftcli.outputs.believability import (
+    LOG_COLUMNS,
+    LogSummary,
+    grounds,
+    headline,
+    least_error,
+)
+from vftcli.outputs.contacts import hardest_rows, otherwise
 from vftcli.outputs.error_tables import axis_grids, blocks, nothing_to_compare, rmse_grid
 from vftcli.outputs.examination import rate_of
 from vftcli.outputs.grid import (
@@ -25,9 +30,9 @@ from vftcli.outputs.grid import (
     Grid,
     GridCell,
     Rows,
-    at_least_shown,
     banded,
     joint_columns,
+    keyed_grid,
     ranged,
     significant,
     vector,
@@ -39,7 +44,7 @@ from vftcli.outputs.page.stage import contact_words, free_spans, stage_data, sti
 from vftcli.outputs.run_record import observer_record, run_record
 from vftcli.outputs.shapes import link_surfaces
 from vftcli.signals.arrays import Z_95, Array
-from vftcli.signals.parsing import counted, printable
+from vftcli.signals.parsing import printable
 from vftcli.signals.remarks import fact, sentence
 from vftcli.wrench.solvers import FRAMES
 
@@ -63,8 +68,6 @@ WRENCHES = (
     *map(Column, ("log-likelihood ratio [nats]", "margin of the place [nats]")),
     *map(Column, ("vendor |F| [N]", "sensor |F| [N]")),
 )
-#: Heads of the overview.
-HEADS = ("Log", "Robot", "Span", "Contacts", "Hardest", "Detects above", "Mean RMSE", "Health")
 
 
 def render(analysis: Analysis, sizes: Mapping[str, int | None] = {}) -> str:
@@ -157,20 +160,14 @@ def errors_view(analysis: Analysis) -> Record:
         return {"state": "none given", "first": ()}
     means, state = found[0].means, "no sample in common with the estimates"
     if means.least is not None:
-        state = f"{least_error(means)} against {found[0].reference}{means.left_out}"
+        name, least = means.least
+        state = f"{significant(least)} N·m ({name}) against {found[0].reference}{means.left_out}"
     return {
         "state": state,
         "first": list(map(rmse_grid, found)),
         "axes": axis_grids(table, [analysis]),
         "missing": nothing_to_compare(table),
     }
-
-
-def least_error(means: JointMeans) -> str:
-    """The least mean RMSE and its observer."""
-    return (
-        DASH if means.least is None else f"{significant(means.least[1])} N·m ({means.least[0]})"
-    )
 
 
 def contact_details(found: ContactList) -> tuple[Grid, ...]:
@@ -248,110 +245,59 @@ def joint_values(values: Array) -> str:
     return part("parts/joint_values", runs)
 
 
-def render_index(analyses: Sequence[tuple[str, Analysis]], failed: Mapping[str, str] = {}) -> str:
-    """The page over several reports, each with its folder."""
-    lines = [(index_line(*each), each[1].errors) for each in analyses]
-    lines.sort(key=lambda line: line[0].rank)
-    robots = dict.fromkeys(a.robot.title or a.robot.name for _, a in analyses)
-    title, lead = index_headline([analysis for _, analysis in analyses])
+def render_logs(
+    lines: Sequence[LogSummary],
+    failed: Mapping[str, str] = {},
+    analyses: Sequence[Analysis] = (),
+    below: str = "",
+) -> str:
+    """The page over several logs: those of a report with their `analyses`, or of a batch."""
+    title, lead = logs_headline(lines)
+    each = zip(lines, analyses, strict=False)
+    rows = [
+        line.row(
+            log=GridCell(line.log, html=line.page and part("parts/link", line.page, line.log)),
+            health=GridCell(line.reason, html=part("parts/state", line)),
+        )
+        for line in sorted(lines, key=lambda line: line.rank)
+    ]
     return page(
         "logs.html",
         title,
-        eyebrow=(f"{len(analyses) + len(failed)} logs", ", ".join(robots)),
+        eyebrow=(
+            f"{len(lines) + len(failed)} logs",
+            ", ".join(dict.fromkeys(line.robot for line in lines)),
+        ),
         words=lead,
-        examinations=[one for _, analysis in analyses for one in analysis.examinations],
-        overview=overview([line for line, _ in lines]),
+        examinations=[one for analysis in analyses for one in analysis.examinations],
+        overview=keyed_grid(LOG_COLUMNS, rows),
         failed=failed,
-        tables=[(line, map(rmse_grid, blocks(e))) for line, e in lines if e is not None],
+        below=below,
+        tables=[(x, map(rmse_grid, blocks(a.errors))) for x, a in each if a.errors is not None],
     )
 
 
-def index_line(folder: str, analysis: Analysis) -> LogSummary:
-    """One log's line, with its page in a sub-folder and its least error."""
-    line = log_line(analysis, grounds(analysis))._replace(page=f"{folder}/index.html")
-    for block in blocks(analysis.errors)[:1]:
-        line = line._replace(error=least_error(block.means))
-    return line
-
-
-def index_headline(analyses: Sequence[Analysis]) -> tuple[str, str]:
+def logs_headline(lines: Sequence[LogSummary]) -> tuple[str, str]:
     """Number of logs with contact, and place of the hardest."""
-    lists = [analysis.contacts for analysis in analyses if analysis.contacts is not None]
-    touched = [found for found in lists if found.contacts]
-    pushed = [found for found in touched if not found.contacts[0].is_load]
-    loads, lead = len(touched) - len(pushed), ""
-    if not lists:
-        return f"External joint torques from {len(analyses)} logs.", ""
-    title = f"Something pushed the arm in {len(pushed)} of {len(analyses)} logs."
-    if not touched:
+    pushed = [line for line in lines if line.contacts and not line.load]
+    loads, lead = sum(line.load is True for line in lines), ""
+    if all(line.contacts is None for line in lines):
+        return f"External joint torques from {len(lines)} logs.", ""
+    title = f"Something pushed the arm in {len(pushed)} of {len(lines)} logs."
+    if not pushed and not loads:
         title = "Nothing pushed the arm, as far as these logs can tell."
-    if hard := [(by_force(each.hardest), each) for each in pushed if each.hardest is not None]:
-        most = max(hard, key=itemgetter(0))[1]
-        lead = f"Hardest in {most.recording}: {hardest_words(most)}."
+    if hard := [line for line in pushed if line.hardest_N is not None]:
+        most = max(hard, key=lambda line: line.hardness)
+        lead = f"Hardest in {most.log}: {most.hardest}."
     if loads:
         lead += f" {loads} more bear{'s' * (loads == 1)} a load, or a wrong payload or model."
     return title, lead.strip()
 
 
-def overview(lines: Sequence[LogSummary]) -> Grid:
-    """The table of all logs, the worst first."""
-    rows: Rows = [
-        (
-            GridCell(x.name, html=part("parts/link", x.page, x.name) if x.page else ""),
-            x.robot,
-            f"{x.duration:.1f} s",
-            x.contacts,
-            x.hardest,
-            DASH if x.least is None else at_least_shown(x.least),
-            x.error,
-            GridCell(f"{MARKS[x.standing]} {x.words}", html=part("parts/state", x)),
-        )
-        for x in sorted(lines, key=lambda line: line.rank)
-    ]
-    return Grid(HEADS, rows)
-
-
-def render_batch(lines: Sequence[LogSummary], failures: pl.DataFrame) -> str:
-    """The page over a batch."""
-    touched = sum(line.contacts not in {DASH, "0", "load"} for line in lines)
-    listed = sum(line.contacts != DASH for line in lines)
-    count = failures.height
-    rows = [
-        (*where, GridCell(line, html=part("parts/wrapped", line)))
-        for *where, line in failures.select("log", "stage", "error", "line").iter_rows()
-    ]
-    return page(
-        "logs.html",
-        f"{len(lines)} logs" + (f", {touched} of {listed} touched." if listed else "."),
-        eyebrow=(f"{len(lines) + count} logs", ", ".join(sorted({line.robot for line in lines}))),
-        words=f"{counted(count, 'log')} could not be analysed." if count else "",
-        failures=Grid(("Log", "Stage", "Error", "Why"), rows),
-        count=count,
-        overview=overview(lines),
-    )
-
-
 def batch_lines(table: pl.DataFrame, pages: Mapping[str, str]) -> Iterator[LogSummary]:
     """The line of every log, from a batch's table alone."""
-    if table.is_empty():
-        return
-    best = {str(log): least_error(joint_means(rows)) for (log,), rows in table.group_by("log")}
-    for row in table.unique("log", keep="first", maintain_order=True).iter_rows(named=True):
-        force, band, count = row["hardest_N"], row["hardest_band_N"], row["contacts"]
-        hardest = DASH
-        if force is not None:
-            hardest = f"{banded(force, band)} at {row['hardest_s']:.1f} s"
-            hardest = hardest if force > band else f"unknown ({hardest})"
-        yield LogSummary(
-            row["log"],
-            row["robot"],
-            row["duration_s"],
-            DASH if count is None else "load" if row["load"] else str(count),
-            hardest,
-            force or 0.0,
-            row["detectable_N"],
-            row["health"],
-            row["reason"],
-            pages.get(row["log"], ""),
-            best.get(row["log"], DASH),
-        )
+    for (log,), rows in table.group_by("log", maintain_order=True):
+        facts = {
+            key: x for key, x in rows.row(0, named=True).items() if key in LogSummary._fields
+        }
+        yield LogSummary(**facts, error=least_error(rows), page=pages.get(str(log), ""))
