@@ -116,7 +116,7 @@ def test_a_list_is_a_sequence_of_its_rows_and_a_table():
 
 def test_a_size_is_a_range_where_the_place_is_unknown_and_torques_where_no_force_is():
     by_place = caution("size-goes-with-place", least_N=20.0, most_N=248.0)
-    assert "57 to 78 N" in repr(contact(remarks=(by_place,)))
+    assert "57–78 N" in repr(contact(remarks=(by_place,)))
     bare = contact_list(contact(), candidates=(contact(number=2),)).without_forces()
     assert "0 1 2 3 4 5 N·m" in repr(bare[0])
     assert (bare[0].wrench, bare.candidates[0].peak_force, bare.smallest_force) == (None,) * 3

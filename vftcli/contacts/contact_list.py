@@ -120,7 +120,7 @@ class Contact(Shown):
         if self.peak_force is None:
             return f"{joined(self.joint_torque)} N·m"
         if self.place_unknown and self.anywhere:
-            return f"{self.anywhere[0]:.0f} to {self.anywhere[1]:.0f} N"
+            return f"{self.anywhere[0]:.0f}–{self.anywhere[1]:.0f} N"
         return f"{self.peak_force:.0f} ± {self.peak_band:.0f} N"
 
     def record(self) -> dict[str, Any]:

@@ -87,7 +87,7 @@ def list_words(found: ContactList) -> str:
     if first.is_load and first.mean_force is not None:
         size = f"below {most_force(first)} on average"
         if first.size_known:
-            size = f"{force_size(first)} on average, {direction(first.mean_force)}"
+            size = f"{first.size} on average, {direction(first.mean_force)}"
         return f"A load, or a wrong payload, or a wrong model: {size}."
     what = f"{counted(len(found.contacts), 'contact')}."
     if hardest is None:
@@ -95,7 +95,7 @@ def list_words(found: ContactList) -> str:
     if not hardest.size_known:
         how = f"How hard is unknown: below {most_force(hardest)}."
         if hardest.place_unknown and hardest.anywhere:
-            how = f"Its size depends on where it touched, unknown: {force_size(hardest)}."
+            how = f"Its size depends on where it touched, unknown: {hardest.size}."
         return f"{what} {how}"
     where = "" if hardest.where == "cannot tell" else f" on the {hardest.where}"
     weak = " (weak)" if hardest.trust == "weak" else ""
@@ -103,7 +103,7 @@ def list_words(found: ContactList) -> str:
     force = hardest.peak_force or 0.0
     sure = not any(c.place_unknown or (c.peak_force or 0.0) > force for c in found.contacts)
     name = "The hardest" if sure else "The hardest of known size"
-    return f"{what} {name}, at {hardest.peak:.1f} s: {force_size(hardest)}{where}{weak}."
+    return f"{what} {name}, at {hardest.peak:.1f} s: {hardest.size}{where}{weak}."
 
 
 def none_words(found: ContactList) -> str:
@@ -130,12 +130,6 @@ def none_words(found: ContactList) -> str:
 def most_force(contact: Contact) -> str:
     """The upper end of a force's band."""
     return f"{(contact.peak_force or 0.0) + (contact.peak_band or 0.0):.0f} N"
-
-
-def force_size(contact: Contact) -> str:
-    """|F| with its band, or its range where the place is unknown."""
-    apart = contact.anywhere if contact.place_unknown else None
-    return ranged(*apart) if apart else banded(contact.peak_force, contact.peak_band)
 
 
 def direction(force: Array) -> str:
@@ -179,7 +173,7 @@ def beginning(contact: Contact) -> str:
         torque = ", ".join(f"{value:.1f}" for value in contact.joint_torque)
         size = f"joint torques {torque} N·m"
     else:
-        size = f"{force_size(contact)}, {direction(contact.wrench[:3])}"
+        size = f"{contact.size}, {direction(contact.wrench[:3])}"
     where = f"{place_words(contact)} ({contact.trust})"
     span = f"for {contact.stop - contact.start:.2f} s"
     return f"{contact.start:.2f} s: {contact_name(contact)} begins, {span}: {size}, {where}"

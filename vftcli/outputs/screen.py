@@ -128,8 +128,12 @@ def log_screen(
     """The screen of one log, of so many lines at most."""
     head, listed, found = first_lines(analysis, canvas), analysis.contacts, grounds(analysis)
     tail, text = doubt_lines(analysis, canvas), ""
-    if (leading := leading_block(analysis)) is not None:
-        tail += canvas.wrapped(against(leading, analysis), 2)
+    if analysis.errors is not None:
+        # Polars takes a tenth of the time of a list without a reference.
+        from vftcli.outputs.error_tables import blocks
+
+        for block in blocks(analysis.errors)[:1]:
+            tail += canvas.wrapped(against(block, analysis), 2)
     for grid in contact_grids(analysis.errors):
         tail += terminal(grid).splitlines()
     if (printed := analysis.published) is not None:
@@ -245,16 +249,6 @@ def ground_lines(
         # A command stays on one line, to be copied.
         room = indent if indent + len(ground.remedy) <= canvas.width else 4
         yield f"{'':{room}}{printable(ground.remedy)}"
-
-
-def leading_block(analysis: Analysis) -> "Block | None":
-    """The first table of errors; None without a reference."""
-    if analysis.errors is None:
-        return None
-    # Polars takes a tenth of the time of a list without a reference.
-    from vftcli.outputs.error_tables import blocks
-
-    return next(iter(blocks(analysis.errors)), None)
 
 
 def against(block: "Block", analysis: Analysis) -> str:

@@ -313,6 +313,8 @@ def test_the_headline_counts_logs(pushed: Analysis) -> None:
     assert "ur5_circle.csv: 91 ± 7 N at 5.1 s. 1 more bears a load" in words
     assert logs_headline([log_line(quiet)] * 2)[0].startswith("Nothing pushed the arm")
     none = replace(pushed, contacts=None)
+    title, _ = logs_headline([*map(log_line, (pushed, quiet, none))])
+    assert "1 of 2 logs" in title  # what is not listed is not known
     assert logs_headline([log_line(none)]) == ("External joint torques from 1 logs.", "")
 
 

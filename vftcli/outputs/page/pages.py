@@ -279,11 +279,12 @@ def render_logs(
 
 def logs_headline(lines: Sequence[LogSummary]) -> tuple[str, str]:
     """Number of logs with contact, and place of the hardest."""
-    pushed = [line for line in lines if line.contacts and not line.load]
-    loads, lead = sum(line.load is True for line in lines), ""
-    if all(line.contacts is None for line in lines):
+    listed = [line for line in lines if line.contacts is not None]
+    pushed = [line for line in listed if line.contacts and not line.load]
+    loads, lead = sum(line.load is True for line in listed), ""
+    if not listed:
         return f"External joint torques from {len(lines)} logs.", ""
-    title = f"Something pushed the arm in {len(pushed)} of {len(lines)} logs."
+    title = f"Something pushed the arm in {len(pushed)} of {len(listed)} logs."
     if not pushed and not loads:
         title = "Nothing pushed the arm, as far as these logs can tell."
     if hard := [line for line in pushed if line.hardest_N is not None]:

@@ -19,7 +19,7 @@ from vftcli.doctor import in_words
 from vftcli.outputs import Record
 from vftcli.outputs.believability import MARKS
 from vftcli.outputs.charts import QUIET, Chart, ChartLine, LineStyle, Span, drawn_line, paint
-from vftcli.outputs.contacts import direction, force_size, place_words, reason
+from vftcli.outputs.contacts import direction, place_words, reason
 from vftcli.outputs.examination import overridden_lines, warnings_of
 from vftcli.outputs.grid import at_least_shown, minus, ranged
 from vftcli.outputs.page.packing import PageClock, page_data
@@ -85,7 +85,7 @@ def templates() -> "Environment":
         lstrip_blocks=True,
     )
     drawing = (ticks, label, scales_of, stripes, strokes, paint)
-    words = (overridden_lines, in_words, direction, force_size, place_words, ranged, reason)
+    words = (overridden_lines, in_words, direction, place_words, ranged, reason)
     functions = (*drawing, *words, at_least_shown, asset, Box)
     made.globals |= {each.__name__: each for each in functions}
     made.globals |= {

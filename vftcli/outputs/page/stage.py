@@ -13,7 +13,7 @@ import numpy as np
 from vftcli.analysis import Analysis
 from vftcli.contacts.contact_list import Contact
 from vftcli.outputs import Record
-from vftcli.outputs.contacts import contact_name, direction, force_size, place_words
+from vftcli.outputs.contacts import contact_name, direction, place_words
 from vftcli.outputs.grid import at_least_shown
 from vftcli.outputs.page.packing import PageClock
 from vftcli.outputs.page.shell import polyline
@@ -226,9 +226,7 @@ def contact_words(contact: Contact) -> str:
 def contact_data(contact: Contact, joints: int, clock: PageClock) -> Record:
     """A contact for the script: its moment, its words, its place."""
     cone = cone_of(contact)
-    size, _, band = (
-        force_size(contact).partition(" ") if contact.wrench is not None else ("",) * 3
-    )
+    size, _, band = contact.size.partition(" ") if contact.wrench is not None else ("",) * 3
     return {
         "number": contact.number,
         "name": contact_name(contact),
