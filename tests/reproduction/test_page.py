@@ -68,7 +68,8 @@ def test_the_page_has_every_item_and_what_failed(made, cheap, tmp_path: Path) ->
     page = (tmp_path / "out" / "index.html").read_text("utf-8")
     for name, item in cheap.items.items():
         assert f'<h2 id="{name}">{item.label}: ' in page
-    assert "A &lt;figure&gt;" in page
+    assert '<span class="wrapped">A &lt;figure&gt;</span>' in page
+    assert ".wrapped{" in page  # so that the words may break
     assert "<strong>In size.</strong> Because." in page
     assert page.count("nothing moved with 2") == 2  # in its row and at its item
     (row,) = re.findall('<th scope="row">alpha</th>(.*?)</tr>', page, re.DOTALL)[:1]

@@ -195,7 +195,7 @@ def overview(found: Mapping[str, PaperItem]) -> Grid:
 
 def wrapped(text: str) -> GridCell:
     """Words that the page may break."""
-    return GridCell(text, html=f'<div class="words">{escape(text)}</div>')
+    return GridCell(text, html=f'<span class="wrapped">{escape(text)}</span>')
 
 
 def write_reproduction(
