@@ -60,6 +60,15 @@ def test_equal_bytes_are_done_once_and_what_cannot_be_read_fails(tmp_path: Path)
     assert asked.failures[2].stage == "finding"
 
 
+def test_rows_of_other_columns_are_of_another_batch(tmp_path: Path, monkeypatch) -> None:
+    asked = batch(tmp_path, [8], 1)
+    ((task,),) = asked.groups()
+    monkeypatch.setattr("vftcli.batch.run.SCHEMA", {"key": str})
+    ((other,),) = batch(tmp_path, [8], 1).groups()
+    assert task.sha256 == other.sha256
+    assert task.key != other.key
+
+
 def test_a_batch_says_how_many_logs_ended_and_which_share_that_is(tmp_path: Path) -> None:
     """None of them is a log; each counts as it ends."""
     heard: list[tuple[str, float]] = []

@@ -76,7 +76,8 @@ class BatchRun:
     def __post_init__(self) -> None:
         # A worker of a cluster may stand in another folder.
         self.job = replace(self.job, choice=with_files(self.job.choice, absolute))
-        self.options = options_digest(self.job)
+        # Rows of other columns fit into no table of these.
+        self.options = options_digest([self.job, *SCHEMA])
         names = labelled(entry.path for entry in self.logs)
         self.labels = [
             names[e.path] if e.episode is None else f"{names[e.path]} episode {e.episode}"
