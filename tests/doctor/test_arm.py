@@ -13,6 +13,7 @@ from vftcli.doctor import Examination, RobotMatch, examine, guess_robot, in_word
 from vftcli.doctor.fit import GUESSED, MAKER, MEASURED, RESIDUAL, by_fit
 from vftcli.robots import PROFILES, Payload, Robot, load_robot
 from vftcli.robots.chain import flange_jacobian
+from vftcli.robots.kernels import momentum_terms
 from vftcli.signals.arrays import Array
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, fact, warning
@@ -69,6 +70,25 @@ def test_nothing_is_said_of_a_sound_log(name):
         assert [f.code for f in made.findings if f.level != "fact"] == []
         assert (made.robots[0].robot, made.robots[0].fits) == (name, True)
         assert made.robots[0].misfit < 0.05
+
+
+def test_rest_where_dry_friction_pushes_either_way_is_no_model_error():
+    """Behind the motion 20 stops of 5 s; each drive holds up to its joint's dry friction more."""
+    stops = np.repeat(np.random.default_rng(5).uniform(-1.0, 1.0, (20, 6)), 625, axis=0)
+    count, last = len(stops), MOTION.q[-1:]
+    still = np.repeat(last, count, axis=0)
+    weight = momentum_terms(UR10E.loaded_chain, last, 0.0 * last).gravity
+    log = replace(
+        MOTION,
+        t=0.008 * np.arange(len(MOTION.t) + count),
+        q=np.concatenate([MOTION.q, still]),
+        dq=np.concatenate([MOTION.require("dq"), 0.0 * still]),
+        current=np.concatenate([CURRENT, (weight + FRICTION * stops) / K]),
+    )
+    for robot in (UR10E, None):
+        made = examine(log, robot)
+        assert (made.robots[0].robot, made.robots[0].fits) == ("ur10e", True)
+        assert made.robots[0].misfit < 0.01  # with the stops it is 4 %
 
 
 @pytest.mark.parametrize(

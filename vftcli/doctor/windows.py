@@ -37,7 +37,7 @@ SIMPSON = np.array([1.0, 4.0, 1.0]) / 6  #: Their weights in the mean.
 SLOW = 0.01  #: Speed at which dry friction has its direction. [rad/s]
 FAST = 0.8  #: Mean direction of a window in which a joint moves.
 #: Windows of motion that suffice; at rest dry friction may be anything.
-ENOUGH = 20
+ENOUGH = 10
 #: Prior mass [kg] and first moment [kg·m] of a load.
 LOAD = np.array([5.0, 0.5, 0.5, 0.5])
 ROUGH = 2.0  #: Errors of a rough description's links, in usual errors.
