@@ -269,6 +269,22 @@ def test_a_log_of_another_number_of_joints_is_refused_as_by_every_command(run) -
         assert "the log has 7 joints but robot 'ur5' has 6; choose another with --robot" in err
 
 
+def test_several_logs_that_fill_the_screen_have_a_line_each(run) -> None:
+    logs = [FIXTURES / "ur5_circle.csv", FIXTURES / "panda_bearing.csv"] * 3
+    code, out, err = run("inspect", *logs, "--robot", "ur5")
+    assert code == 3
+    assert err.count("panda_bearing.csv left out: the log has 7 joints") == 3
+    assert len(out.splitlines()) <= 40
+    assert out.count("ur5_circle.csv") >= 3
+    code, out, _ = run("inspect", *[FIXTURES / "ur5_circle.csv"] * 4, "--robot", "ur5")
+    assert (code, out.splitlines()[-1]) == (0, "Each log by itself: --details")
+    assert out.count("ur5_circle.csv: log health: sound") == 4
+    words = ("--robot", "ur5", "--details")
+    assert (
+        run("inspect", *[FIXTURES / "ur5_circle.csv"] * 4, *words)[1].count("longest step") == 4
+    )
+
+
 def test_names_with_control_characters_are_shown_harmlessly(run, tmp_path: Path) -> None:
     names = ("\x1b[31mred", "two\nlines", "<b>three</b>")
     log = Recording(t=0.1 * np.arange(5), q=np.zeros((5, 3)), joint_names=names)

@@ -162,9 +162,9 @@ class LeftOut:
         """Say that a log is left out, and why; raise it for the only one."""
         if not self._several:
             raise error
-        reason = " ".join(str(error).split())
-        self.reasons[self._library.label(log)] = reason
-        echo(printable(f"error: {self._library.label(log)} left out: {reason}"), err=True)
+        label = self._library.label(log)
+        self.reasons[label] = " ".join(str(error).split()).removeprefix(f"{label}: ")
+        echo(printable(f"error: {label} left out: {self.reasons[label]}"), err=True)
 
     def end(self, done: int) -> None:
         """Stop with exit code 3 if any was left out, 1 if all were."""

@@ -1,5 +1,6 @@
 """`vftcli inspect`: the log doctor, and a log's options in a file."""
 
+import math
 import os
 from collections.abc import Sequence
 from dataclasses import replace
@@ -10,7 +11,7 @@ import typer
 
 from vftcli.cli import options as opt
 from vftcli.cli.config import NAME
-from vftcli.cli.console import LeftOut, echo, say, say_json, say_robots
+from vftcli.cli.console import LeftOut, echo, echo_top, say, say_json, say_robots
 from vftcli.readers.reader import ReadChoice
 from vftcli.robots import RobotChoice
 from vftcli.signals.option import Asked, Option
@@ -42,9 +43,10 @@ def inspect_log(
     Example: vftcli inspect fixtures/ur5_circle.csv
     """
     from vftcli.doctor import Examiner, examine
-    from vftcli.outputs.examination import examination_record, examination_text
+    from vftcli.outputs.examination import examination_record, examinations_text
     from vftcli.outputs.files import check_file
     from vftcli.outputs.run_record import log_entry
+    from vftcli.outputs.screen import MOST_LINES
     from vftcli.readers.reading import Library
     from vftcli.signals.errors import VftError
 
@@ -67,7 +69,8 @@ def inspect_log(
         left_out.end(0)
     say_robots(examiner.robots)
     if not json:
-        echo("\n\n".join(map(examination_text, examinations)))
+        most = math.inf if asked.words["details"] else MOST_LINES
+        echo_top(examinations_text(examinations, most))
     written = {} if output is None else write_options(output, logs, asked, force=force)
     if json:
         entries = [log_entry(one.recording, examination_record(one)) for one in examinations]

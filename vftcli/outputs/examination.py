@@ -110,6 +110,15 @@ def warnings_of(examination: Examination) -> tuple[Remark, ...]:
     return (*read, *examination.warnings)
 
 
+def examinations_text(examinations: Sequence[Examination], most: float) -> str:
+    """Texts of some logs; a line each where several have more lines than `most`."""
+    text = "\n\n".join(map(examination_text, examinations))
+    if len(examinations) == 1 or text.count("\n") < most:
+        return text
+    lines = (health_line(each, named=True) for each in examinations)
+    return "\n".join((*lines, "Each log by itself: --details"))
+
+
 def health_line(examination: Examination, *, named: bool = False) -> str:
     """Faults of a log on one line: number, the first, names of the others."""
     recording, found = examination.recording, warnings_of(examination)

@@ -18,6 +18,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager, suppress
 from contextvars import ContextVar
 from pathlib import Path
+from tempfile import TemporaryFile
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self
 
@@ -419,5 +420,7 @@ def check_writable(folder: Path) -> None:
     """Raise the operating system's error if no file can be made in `folder`."""
     if not folder.is_dir():
         raise FileNotFoundError(2, "there is no such folder", str(folder))
-    if not os.access(folder, os.W_OK | os.X_OK):
-        raise PermissionError(13, "no permission to write there", str(folder))
+    try:  # permissions do not tell on every file system
+        TemporaryFile(dir=folder).close()
+    except PermissionError:
+        raise PermissionError(13, "no permission to write there", str(folder)) from None

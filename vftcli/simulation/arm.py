@@ -105,8 +105,8 @@ class Arm:
 
     def __init__(self, scenario: Scenario, seed: int, start: Reference, duration: float) -> None:
         """Prepare a run of a length [s] from the reference's one row."""
-        if seed < 0:
-            raise ParameterError(f"the seed is {seed}; it must be zero or positive")
+        if not isinstance(seed, (int, np.integer)) or seed < 0:
+            raise ParameterError(f"the seed is {seed!r}; it must be zero or positive")
         for name in ("temperature_begin", "temperature_end"):
             value = getattr(scenario.friction, name)
             if value is not None and not COLDEST <= value <= WARMEST:
