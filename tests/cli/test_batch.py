@@ -116,7 +116,8 @@ def test_compare_has_the_errors_of_compare(run, tmp_path: Path) -> None:
 
 def test_contacts_are_counted_and_listed(run, tmp_path: Path) -> None:
     words = ("--robot", "ur5", "--interval", "3:8", "--jobs", "0", "-o", tmp_path)
-    assert run("batch", CIRCLE, "--do", "contacts", *words)[0] == 0
+    code, said, _ = run("batch", CIRCLE, "--do", "contacts", *words, "--json")
+    assert (code, json.loads(said)) == (0, record(tmp_path))
     (row,) = pl.read_parquet(tmp_path / "batch.parquet").iter_rows(named=True)
     (listed,) = tmp_path.glob("logs/*/*/contacts.json")
     assert row["contacts"] == len(json.loads(listed.read_text())["contacts"])

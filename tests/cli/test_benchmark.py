@@ -399,6 +399,8 @@ def test_an_experiment_that_fails_is_a_row_and_exit_code_one(run, monkeypatch, t
                      items={"table1": item, "fig1": drawn}, setting=())  # fmt: skip
     monkeypatch.setitem(paper.PAPERS, "p", declared)
     monkeypatch.setitem(experiments.RUNS, "fail", fail)
+    code, out, err = run("reproduce", "p", "-o", tmp_path / "json", "--json")
+    assert (code, json.loads(out)["paper"]) == (1, "p")
     code, out, err = run("reproduce", "p", "-o", tmp_path / "out")
     assert code == 1
     assert "the experiment, seed 1: nothing moved with 1" in out + err

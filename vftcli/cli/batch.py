@@ -8,7 +8,7 @@ import typer
 
 from vftcli.batch import WorkersChoice
 from vftcli.cli import options as opt
-from vftcli.cli.console import SOME_FAILED, say
+from vftcli.cli.console import SOME_FAILED, echo_data, say
 from vftcli.cli.progress import STAGES
 from vftcli.evaluation import ReferenceChoice
 from vftcli.outputs import OutputChoice
@@ -36,6 +36,7 @@ def batch(
         ),
     ],
     asked: Asked,
+    json: opt.Json,
     force: opt.Force,
 ) -> None:
     """Run a command on many logs; resume where it stopped.
@@ -66,7 +67,6 @@ def batch(
         choice = narrowed(choice)
     # These are of each worker.
     choice = replace(choice, library=Library(), examiner=Examiner())
-    job = LogJob(do=do, choice=choice, anyway=anyway, written=opt.outputs_of(asked))
     engine = asked.of(WorkersChoice)
     engine.check_closed(anyway=anyway)
     collection = LogCollection(choice.read, output)
@@ -80,7 +80,7 @@ def batch(
         )
     run = BatchRun(
         logs=found,
-        job=job,
+        job=LogJob(do=do, choice=choice, anyway=anyway, written=opt.outputs_of(asked)),
         folder=BatchFolder(absolute(output)),
         workers=engine,
         command=asked.line,
@@ -96,5 +96,7 @@ def batch(
         f"{counted(count.logs, 'log')}: {count.done} done now, {count.before} earlier, "
         f"{count.failed} failed; {output / 'index.html'}, {output / 'batch.parquet'}"
     )
+    if json:
+        echo_data((output / "run.json").read_text("utf-8"))
     if count.failed:
         raise typer.Exit(SOME_FAILED if count.done + count.before else 1)

@@ -6,8 +6,11 @@ from typing import Annotated
 import typer
 
 from vftcli.cli import options as opt
-from vftcli.cli.console import say, show
+from vftcli.cli.console import echo_data, say, show
 from vftcli.signals.option import Asked, Option
+
+#: Line below the table.
+ABOUT = "ours / print: our number over the paper's, median of an item's lines (least … most)"
 
 
 @opt.command(opt.Talk)
@@ -21,6 +24,7 @@ def reproduce(
     ],
     fast: Annotated[bool, Option("--fast", "", "Use one seed a scenario instead of five.")],
     force: opt.Force,
+    json: opt.Json,
     asked: Asked,
 ) -> None:
     """Run the paper's experiments beside its numbers.
@@ -54,8 +58,10 @@ def reproduce(
     found = gather(wanted, names, run_jobs(chosen))
     with folder:
         write_reproduction(folder, wanted, found, chosen, asked.line, figures)
-    about = "ours / print: our number over the paper's, median of an item's lines (least … most)"
-    show(terminal(overview(found)) + about)
+    if json:
+        echo_data((output / "run.json").read_text("utf-8"))
+    else:
+        show(terminal(overview(found)) + ABOUT)
     say(f"wrote {output}: open {output / 'index.html'}")
     if any(item.failures for item in found.values()):
         raise typer.Exit(1)
