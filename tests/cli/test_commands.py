@@ -269,6 +269,7 @@ def test_a_log_of_another_number_of_joints_is_refused_as_by_every_command(run) -
         assert "the log has 7 joints but robot 'ur5' has 6; choose another with --robot" in err
 
 
+@pytest.mark.slow
 def test_several_logs_that_fill_the_screen_have_a_line_each(run) -> None:
     logs = [FIXTURES / "ur5_circle.csv", FIXTURES / "panda_bearing.csv"] * 3
     code, out, err = run("inspect", *logs, "--robot", "ur5")
@@ -371,6 +372,7 @@ def test_two_free_logs_are_counted_against_each_other(free: Path, pushed: Path, 
     assert counted["free.npy"]["joints"][1] == 0
 
 
+@pytest.mark.slow
 def test_a_simulated_log_is_checked_against_the_truth_beside_it(run, refused) -> None:
     log = FIXTURES / "panda_bearing.csv"
     words = ("--robot", "panda", "--rate", 60, "--anyway")

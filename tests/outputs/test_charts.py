@@ -94,7 +94,7 @@ def test_of_a_plot_the_spike_of_one_sample_survives_in_every_line_at_its_own_tim
     values = rng.normal(size=(len(t), 3))
     spikes = rng.choice(len(t), 3, replace=False)
     values[spikes, [0, 1, 2]] = 1e3, -1e3, 1e3
-    rows = charts.level_rows(t, values, stretches)
+    rows = charts.level_rows(t, list(values.T), stretches)
     assert set(spikes) <= set(rows)
     assert {0, len(t) - 1} <= set(rows)
     assert len(rows) <= 2 * 3 * stretches + 2
@@ -106,10 +106,10 @@ def test_of_a_plot_the_spike_of_one_sample_survives_in_every_line_at_its_own_tim
 def test_every_sample_of_a_whole_span_and_the_edges_of_what_is_unknown_stay() -> None:
     t = 0.001 * np.arange(10_000)
     values = np.where((t > 3.0005) & (t < 3.0105), np.nan, np.sin(t))[:, None]
-    rows = charts.level_rows(t, values, 40, [(6.9995, 7.1005), (9.9, 12.0)])
+    rows = charts.level_rows(t, list(values.T), 40, [(6.9995, 7.1005), (9.9, 12.0)])
     assert {*range(7000, 7101), *range(9900, 10_000)} <= set(rows)
     assert np.isnan(values[rows]).any()  # ten unknown samples amid a stretch of 250
     assert len(rows) <= 2 * 40 + 2 + 1 + 101 + 100
     # Two of each line and stretch: as many as there are.
-    assert charts.level_rows(t[:1200], np.zeros((1200, 3)), 200) is None
-    assert charts.level_rows(t[:1200], np.zeros((1200, 3)), 199) is not None
+    assert charts.level_rows(t[:1200], list(np.zeros((3, 1200))), 200) is None
+    assert charts.level_rows(t[:1200], list(np.zeros((3, 1200))), 199) is not None

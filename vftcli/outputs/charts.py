@@ -175,7 +175,7 @@ def thinned(t: Array, values: Array, stretches: int, *, log: bool = False) -> tu
         if log:
             starts = np.unique(np.searchsorted(t, np.geomspace(t[0], t[-1], stretches)))
         # Samples beside a gap stay, so that lines end there.
-        ends = extremes(values[:, None], starts)
+        ends = extremes([values], starts)
         kept = np.unique(np.concatenate([[0, len(t) - 1], ends, gaps, gaps + 1]))
         x, y = t[kept], values[kept]
     after = np.searchsorted(x, t[gaps], side="right")
@@ -183,21 +183,21 @@ def thinned(t: Array, values: Array, stretches: int, *, log: bool = False) -> tu
 
 
 def level_rows(
-    t: Array, values: Array, stretches: int, whole: Sequence[tuple[float, float]] = ()
+    t: Array, lines: Sequence[Array], stretches: int, whole: Sequence[tuple[float, float]] = ()
 ) -> Index | None:
     """Sample numbers of a plot with one clock for all lines, None for all. (P,)
 
     Of every stretch the lowest, highest and first unknown sample of every line stay, so
     that no spike is lost and no gap closed; of the spans `whole` [s] every sample.
     """
-    if len(t) <= 2 * values.shape[1] * stretches:
+    if len(t) <= 2 * len(lines) * stretches:
         return None
     kept, starts = np.zeros(len(t), dtype=bool), even_starts(len(t), stretches)
     gaps = gaps_of(t, GAP_STEPS)
-    for rows in ([0, -1], gaps, gaps + 1, extremes(values, starts)):
+    for rows in ([0, -1], gaps, gaps + 1, extremes(lines, starts)):
         kept[rows] = True
-    for column in values.T:
-        unknown = np.flatnonzero(np.isnan(column))
+    for line in lines:
+        unknown = np.flatnonzero(np.isnan(line))
         _, first = np.unique(np.searchsorted(starts, unknown, "right"), return_index=True)
         kept[unknown[first]] = True
     for begin, end in whole:
@@ -210,14 +210,13 @@ def even_starts(samples: int, stretches: int) -> Index:
     return np.arange(0, samples, -(-samples // stretches))
 
 
-def extremes(values: Array, starts: Index) -> Index:
-    """First lowest and highest known sample of every stretch, else its first one."""
-    stops, kept = np.append(starts[1:], len(values)), list[Index]()
+def extremes(lines: Sequence[Array], starts: Index) -> Index:
+    """Of lines (T,) the first lowest and highest known sample of a stretch, else its first."""
+    stops, kept = np.append(starts[1:], len(lines[0])), list[Index]()
     longest = np.arange(max(stops - starts))
     at = np.minimum(starts[:, None] + longest, stops[:, None] - 1)
-    # One column at a time: all of a long log would fill the memory.
-    for column in values.T:
-        here = column[at]
+    for line in lines:
+        here = line[at]
         unknown = np.isnan(here)
         kept.append(starts + np.where(unknown, np.inf, here).argmin(axis=1))
         kept.append(starts + np.where(unknown, -np.inf, here).argmax(axis=1))

@@ -234,8 +234,8 @@ def lines_of(plot: Chart) -> list[ChartLine]:
 
 def thinned(plot: Chart, stretches: int, whole: Sequence[tuple[float, float]]) -> Chart:
     """The plot with the samples of `level_rows`."""
-    values = np.hstack([line.values for line in lines_of(plot)])
-    rows = level_rows(plot.x, values, stretches, whole)
+    lines = [column for line in lines_of(plot) for column in line.values.T]
+    rows = level_rows(plot.x, lines, stretches, whole)
     if rows is None:
         return plot
     series = tuple(
