@@ -151,7 +151,8 @@ class Wrench(TimeSeries):
     @property
     def known(self) -> Array:
         """The wrench, NaN where unknown. (T, 6) [N, N·m]"""
-        return np.where(self.hidden[:, None], np.nan, self.values)
+        hidden = self.hidden
+        return np.where(hidden[:, None], np.nan, self.values) if hidden.any() else self.values
 
     @property
     def force(self) -> Array:
