@@ -70,6 +70,16 @@ def test_cycles_that_are_not_there(circle: Run, cycle: int) -> None:
         _ = motion_of(circle, choice=FreeChoice(cycles=(1, cycle))).cycles_given
 
 
+def test_an_arm_that_only_yields_has_no_free_cycle_but_those_named(circle: Run) -> None:
+    """The same motion, .09 rad of it: pushes on an arm that holds still move it as much."""
+    log = circle.recording
+    q = log.q[0] + (log.q - log.q[0]) * 0.09 / np.ptp(log.q, axis=0).max()
+    run = replace(circle, recording=replace(log, q=q))
+    with pytest.raises(ReferenceTorqueError, match="no joint moves"):
+        assert FreeMotion(log=run).known
+    assert FreeMotion(log=run, choice=FreeChoice(cycles=(1,))).known.own.any()
+
+
 def test_a_cycle_inside_a_free_span_is_free(circle: Run) -> None:
     motion = motion_of(circle, choice=FreeChoice(spans=((3.9, 8.1), (19.0, np.inf))))
     assert motion.free_cycles.numbers == (1,)

@@ -47,6 +47,8 @@ from vftcli.signals.recording import Recording, refuse_repeated_logs
 from vftcli.signals.remarks import Remark, Where, caution, fact
 from vftcli.signals.shown import Shown
 
+#: Joints that move less only yield to pushes. [rad]
+SWAY = 0.1
 #: A cycle counts as inside a span if it sticks out by no more than this share of itself.
 SLACK = 0.03
 
@@ -182,6 +184,10 @@ class FreeMotion(Shown):
             fact("free-span", begin_s=max(a, ends[0]), end_s=min(b, ends[1])) for a, b in spans
         ]
         given = choice.is_given or bool(self.runs)
+        if not given and np.ptp(log.recording.q, axis=0).max() < SWAY:
+            raise ReferenceTorqueError(
+                f"{log.name}: no joint moves {SWAY:g} rad, so no cycle of it is free motion: --free"
+            )
         if choice.cycles or not given:
             found = self.free_cycles
             own = own | np.isin(self.cycles.number(t), found.numbers)
