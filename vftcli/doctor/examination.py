@@ -250,8 +250,8 @@ def guessed(recording: Recording) -> tuple[str, tuple[Remark, ...]]:
         if near:
             good = [f"--robot {fit.robot}" for fit in near if fit.fits]
             best = f"Best fits: {', '.join(fit.in_short for fit in near)}"
-            none = "none explains the torques (vftcli inspect). Add --robot NAME or a URDF"
-            words = f"{best}. Add {' or '.join(good)}" if good else f"{best}; {none}"
+            none = f"No profile fits; nearest is {near[0].robot}. Give a URDF: --robot FILE"
+            words = f"{best}. Add {' or '.join(good)}" if good else none
         raise UnsettledRobotError(f"Which arm? {words}", recording)
     others = [fit.in_short for fit in fits[:3] if fit is not found]
     remark = fact("robot-guessed", robot=found.robot, fit=str(found), others=others or ["none"])
