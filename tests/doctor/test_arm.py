@@ -72,6 +72,15 @@ def test_nothing_is_said_of_a_sound_log(name):
         assert made.robots[0].misfit < 0.05
 
 
+@pytest.mark.parametrize("joint", [4, 5, 6])
+def test_a_turned_wrist_joint_is_named_beside_an_error_of_a_fifth(joint):
+    """It changes the whole misfit little: what it explains on its own joint counts."""
+    turned = CURRENT.copy()
+    turned[:, joint - 1] *= -1.0
+    (finding,) = [f for f in findings(with_wave(drawn(turned), 0.2)) if f.code == "joint-sign"]
+    assert finding.where.joints == (joint,)
+
+
 def test_rest_where_dry_friction_pushes_either_way_is_no_model_error():
     """Behind the motion 20 stops of 5 s; each drive holds up to its joint's dry friction more."""
     stops = np.repeat(np.random.default_rng(5).uniform(-1.0, 1.0, (20, 6)), 625, axis=0)
