@@ -106,6 +106,24 @@ def test_an_interrupt_while_the_program_loads_is_no_traceback() -> None:
     )  # 130 in a shell
 
 
+def test_an_interrupt_that_a_library_swallows_ends_the_command() -> None:
+    """NumPy's random module dropped it while it loaded, and the command ran to its end."""
+    script = (
+        "import os, signal, sys\n"
+        "class Swallows:\n"
+        "    def find_spec(self, name, *_):\n"
+        "        if name == 'vftcli.pipeline':\n"
+        "            try:\n"
+        "                os.kill(os.getpid(), signal.SIGINT)\n"
+        "            except BaseException:\n"
+        "                pass\n"
+        "sys.meta_path.insert(0, Swallows())\n"
+    )
+    done = launched("contacts", CIRCLE, begin=("-c", script + PROGRAM))
+    assert (done.returncode, done.stdout) == (130, "")
+    assert done.stderr.endswith("error: interrupted; run the command again\n")
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_stopped_command_says_so_and_leaves_nothing(tmp_path: Path, number: int) -> None:

@@ -160,7 +160,8 @@ def stop(number: int, _frame: FrameType | None) -> None:
     """Unwind the command, once: a second signal stops no cleaning up."""
     for each in (signal.SIGINT, signal.SIGTERM):
         signal.signal(each, signal.SIG_IGN)
-    raise Stopped(number)
+    STAGES.stopped = Stopped(number)
+    raise STAGES.stopped
 
 
 class ClosedOutput(io.TextIOBase):

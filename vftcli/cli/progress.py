@@ -27,6 +27,7 @@ class Stages:
     def __init__(self) -> None:
         self._begun: float | None = None
         self._stage = ""
+        self.stopped: BaseException | None = None  # a library that loads may swallow it
         self.waiting: list[str] = []  # words for stderr before whatever is printed next
         self._share = 0.0
         self._from = (0.0, 0.0)  # time and share since which the speed is measured
@@ -35,6 +36,8 @@ class Stages:
 
     def hear(self, stage: str, share: float) -> None:
         """Note the present stage, "" if unchanged, and the share that is done."""
+        if self.stopped is not None:
+            raise self.stopped
         if not stage:
             self._share = share
             return
