@@ -194,7 +194,7 @@ class BatchRun:
             schema=dict.fromkeys(("log", "key", "stage", "error", "line"), pl.String),
             orient="row",
         )
-        failed = {self.labels[n]: f"{f.line} ({f.stage}, {f.type})" for n, f in ends}
+        failed = {self.labels[n]: f.line for n, f in ends}
         done = len(finished) - self.before
         count = BatchCount(len(self.logs), self.before, done, len(self.failures))
         # A report is a log's own page.

@@ -308,7 +308,7 @@ def render_benchmark(results: Results, title: str, record: Record) -> str:
         methods=[*results.colours],
         plots=[dots(own, [*results.colours]) for own in contact],
         worst=[worst_chart(row, results.colours[BEST]) for row in drawn.to_dicts()],
-        logs=keyed_grid(dict(zip(keys, keys, strict=True)), record["logs"]),
+        logs=keyed_grid({key: key.replace("_", " ") for key in keys}, record["logs"]),
         record=record,
     )
 

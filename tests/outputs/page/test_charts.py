@@ -102,6 +102,8 @@ def test_only_what_is_shown_stands_in_the_small_pictures_and_names_are_words() -
     assert html.count('aria-pressed="false"') == 1
     assert "legend" in html
     assert "legend" not in shell.part("svg/multiples", chart(t, lines[0]))  # one line needs none
+    doubtful = chart(t, lines[0])._replace(panels=("J1†", "J2"))
+    assert "†: the joint rests most of the time" in shell.part("svg/multiples", doubtful)
     for text in (
         html,
         shell.part("svg/axes", SCALES, "<i>"),

@@ -193,7 +193,7 @@ class Plot {
 			spans.forEach(([start, stop], k) => fill(css[felt?.[k].weak ? "weak" : "stripe"], this.x(start), top, max(this.x(stop) - this.x(start), 1), tall));
 			if (band?.[panel]) fill(css.unseen, LEFT, this.y(band[panel]), wide, this.y(-band[panel]) - this.y(band[panel]));
 		});
-		const up = ticks(...ends[panel], max(2, tall / 34)), across = ticks(...this.clock.view, max(2, wide / 90));
+		const up = ticks(...ends[panel], max(3.6, tall / 34)), across = ticks(...this.clock.view, max(2, wide / 90));
 		for (const value of up.found) {
 			const y = round(this.y(value)) + .5;
 			path([[LEFT, y], [LEFT + wide, y]], abs(value) < 1e-12 ? css.zero : css.line);

@@ -261,6 +261,7 @@ def render_logs(
         )
         for line in sorted(lines, key=lambda line: line.rank)
     ]
+    keys = [key for key in LOG_COLUMNS if any(row[key] not in (None, DASH) for row in rows)]
     return page(
         "logs.html",
         title,
@@ -270,7 +271,7 @@ def render_logs(
         ),
         words=lead,
         examinations=[one for analysis in analyses for one in analysis.examinations],
-        overview=keyed_grid(LOG_COLUMNS, rows),
+        overview=keyed_grid({key: LOG_COLUMNS[key] for key in keys}, rows),
         failed=failed,
         below=below,
         tables=[(x, map(rmse_grid, blocks(a.errors))) for x, a in each if a.errors is not None],

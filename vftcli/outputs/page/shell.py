@@ -20,6 +20,7 @@ from vftcli.outputs import Record
 from vftcli.outputs.believability import MARKS
 from vftcli.outputs.charts import QUIET, Chart, ChartLine, LineStyle, Span, drawn_line, paint
 from vftcli.outputs.contacts import direction, place_words, reason
+from vftcli.outputs.error_tables import RESTS
 from vftcli.outputs.examination import overridden_lines, warnings_of
 from vftcli.outputs.grid import at_least_shown, minus, ranged
 from vftcli.outputs.page.packing import PageClock, page_data
@@ -91,6 +92,7 @@ def templates() -> "Environment":
     made.globals |= {
         "is_plain": re.compile(r"[\w.,=×+ -]+").fullmatch,
         "QUIET": QUIET,
+        "RESTS": RESTS,
         "MARKS": MARKS,
     }
     filters = (counted, warnings_of, worst_first, options, capital)
