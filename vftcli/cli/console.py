@@ -17,7 +17,7 @@ from vftcli.cli.progress import STAGES, is_terminal
 from vftcli.signals.errors import VftError
 from vftcli.signals.packages import PACKAGES, check_installed, installed
 from vftcli.signals.parsing import counted, printable
-from vftcli.signals.progress import heard_by, nobody
+from vftcli.signals.progress import heard_by
 
 if TYPE_CHECKING:
     from vftcli.analysis import Analysis
@@ -41,7 +41,8 @@ def speaking(*, details: bool, quiet: bool) -> Iterator[None]:
         raise typer.BadParameter("choose one of --details, --quiet")
     token = _level.set(DETAILS if details else QUIET if quiet else USUAL)
     try:
-        with heard_by(STAGES.hear if is_terminal(sys.stderr) and not quiet else nobody):
+        STAGES.silent = quiet or not is_terminal(sys.stderr)
+        with heard_by(STAGES.hear):
             yield
     finally:
         _level.reset(token)

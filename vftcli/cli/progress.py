@@ -27,6 +27,7 @@ class Stages:
     def __init__(self) -> None:
         self._begun: float | None = None
         self._stage = ""
+        self.silent = False  # whether the line is not shown
         self.stopped: BaseException | None = None  # a library that loads may swallow it
         self.waiting: list[str] = []  # words for stderr before whatever is printed next
         self._share = 0.0
@@ -38,7 +39,7 @@ class Stages:
         """Note the present stage, "" if unchanged, and the share that is done."""
         if self.stopped is not None:
             raise self.stopped
-        if not stage:
+        if not stage or self.silent:
             self._share = share
             return
         is_new, self._stage = stage != self._stage, stage
@@ -110,9 +111,8 @@ class Stages:
                 if gained > ENOUGH:
                     seconds = (time.monotonic() - since) * (1.0 - self._share) / gained
                     left = f"  {clock(seconds)} left"
-                room = (
-                    min(WIDTH, shutil.get_terminal_size().columns - 1) - len(bar) - len(left) - 2
-                )
+                wide = min(WIDTH, shutil.get_terminal_size().columns - 1)
+                room = wide - len(bar) - len(left) - 2
                 line = f"{bar}  {self._stage[: max(room, 0)]}{left}"
                 typer.echo(f"\r{line:<{self._shown}}", err=True, nl=False)
                 self._shown = len(line)

@@ -172,16 +172,9 @@ def log_line(analysis: Analysis, page: str = "") -> LogSummary:
     """One log among several."""
     recording, listed, found = analysis.recording, analysis.contacts, grounds(analysis)
     worst = health(found)
-    line = LogSummary(
-        recording.name,
-        analysis.robot.name,
-        recording.duration,
-        worst.standing,
-        "sound" if worst.standing == "good" else f"{worst.subject}: {worst.sentence}",
-        error=least_error(analysis.errors),
-        page=page,
-        grounds=found,
-    )
+    reason = "sound" if worst.standing == "good" else f"{worst.subject}: {worst.sentence}"
+    known = recording.name, analysis.robot.name, recording.duration, worst.standing, reason
+    line = LogSummary(*known, error=least_error(analysis.errors), page=page, grounds=found)
     if listed is None:
         return line
     line = line._replace(

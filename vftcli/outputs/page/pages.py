@@ -253,6 +253,7 @@ def render_logs(
 ) -> str:
     """The page over several logs: those of a report with their `analyses`, or of a batch."""
     title, lead = logs_headline(lines)
+    robots = dict.fromkeys(line.robot for line in lines)
     each = zip(lines, analyses, strict=False)
     rows = [
         line.row(
@@ -265,10 +266,7 @@ def render_logs(
     return page(
         "logs.html",
         title,
-        eyebrow=(
-            f"{len(lines) + len(failed)} logs",
-            ", ".join(dict.fromkeys(line.robot for line in lines)),
-        ),
+        eyebrow=(f"{len(lines) + len(failed)} logs", ", ".join(robots)),
         words=lead,
         examinations=[one for analysis in analyses for one in analysis.examinations],
         overview=keyed_grid({key: LOG_COLUMNS[key] for key in keys}, rows),
