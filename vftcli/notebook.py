@@ -13,7 +13,7 @@ from functools import wraps
 from inspect import Parameter, Signature, signature
 from pathlib import Path
 from types import NoneType
-from typing import TYPE_CHECKING, Any, TypeVar, get_args
+from typing import TYPE_CHECKING, TypeVar, get_args
 
 import polars as pl
 
@@ -50,7 +50,7 @@ from vftcli.robots import RobotChoice
 from vftcli.robots.robot import Robot
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.option import Anyway, Asked, Choice, settings_as_typed
-from vftcli.signals.parsing import did_you_mean
+from vftcli.signals.parsing import checked_call
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remarks
 from vftcli.wrench import AlsoWrench, WrenchChoice
@@ -61,6 +61,7 @@ if TYPE_CHECKING:
 
 #: A robot's name by the user; None for the log's own.
 NamedRobot = str | Path | Robot | None
+Logs = Opened | OpenedLogs
 R = TypeVar("R")
 
 #: Choices that give the calls their options.
@@ -108,46 +109,40 @@ def call(
 
         @wraps(function)
         def called(*places: object, **given: object) -> R:
-            for word in given:
-                if word not in shown.parameters:
-                    near = did_you_mean(word, shown.parameters)
-                    raise ParameterError(f"vft.{name} has no keyword {word}.{near}")
-            try:
-                bound = shown.bind(*places, **given)
-            except TypeError as error:
-                raise ParameterError(f"vft.{name}: {error}") from None
-            values = dict(bound.arguments)
+            values = dict(shown.bind(*places, **given).arguments)
             said = ", ".join(f"{word}={value!r}" for word, value in values.items())
-            log, arm = checked(values.pop(first.name, None), values.pop("robot", None))
+            log = opened(values.pop(first.name, None), first.annotation)
+            arm = values.pop("robot", None)
+            if not isinstance(arm, NamedRobot):
+                raise ParameterError(f"robot is {arm!r}; expected 'ur5', a file, or a Robot")
             settings = settings_as_typed(values.pop("settings", None) or {}, kinds)
             typed = {
                 w: options[w].keyword(values.pop(w), Recording) for w in words if w in values
             }
             if typed.get("columns") is not None and isinstance(log, Recording):
                 raise ParameterError("columns are those of a file; this log is read already")
-            asked = Asked(typed | {"robot": arm}, settings, f"vftcli.{name}({said})")
+            typed["robot"] = str(arm) if isinstance(arm, Path) else arm
+            asked = Asked(typed, settings, f"vftcli.{name}({said})")
             return function(log, asked, **values)
 
         vars(called)["__signature__"] = shown
-        return called
+        return checked_call(called)
 
     return of
 
 
-def checked(log: object, robot: object) -> tuple[Any, str | Robot | None]:
-    """One log or several, and a robot; names as paths. Others raise."""
-    if not isinstance(robot, NamedRobot):
-        raise ParameterError(f"robot is {robot!r}; expected a name as 'ur5', a file, or a Robot")
-    for each in log if isinstance(log, list | tuple) else [log]:
-        if not isinstance(each, str | Opened | None):
-            raise ParameterError(f"the log is {each!r}; expected a file's name or a Recording")
-    arm = str(robot) if isinstance(robot, Path) else robot
-    if isinstance(log, list | tuple):
-        return [Path(one) if isinstance(one, str) else one for one in log], arm
-    return Path(log) if isinstance(log, str) else log, arm
+def opened(logs: object, kind: object) -> object:
+    """One log or several of a kind, names as paths. Others raise."""
+    kinds = get_args(kind)
+    each = logs if isinstance(logs, list | tuple) and OpenedLogs in kinds else [logs]
+    for one in each:
+        if not isinstance(one, str | Opened) and (one is not None or NoneType not in kinds):
+            raise ParameterError(f"the log is {one!r}; expected a file's name or a Recording")
+    paths = [Path(one) if isinstance(one, str) else one for one in each]
+    return paths if each is logs else paths[0]
 
 
-def several(logs: Opened | OpenedLogs) -> list[Opened]:
+def several(logs: Logs) -> list[Opened]:
     """One log or several as a list."""
     found = [logs] if isinstance(logs, Opened) else list(logs)
     if not found:
@@ -182,11 +177,7 @@ def estimate(log: Opened, asked: Asked) -> Analysis:
 
 @call(*OF_REPORT)
 def report(
-    log: Opened,
-    asked: Asked,
-    *,
-    output: str | Path | None = None,
-    force: bool = False,
+    log: Opened, asked: Asked, *, output: str | Path | None = None, force: bool = False
 ) -> Analysis:
     """Everything about a log, as `vftcli report`; ``output=``: the folder to write."""
     made = analysed(log, choice_for(asked, [log]), asked)
@@ -205,7 +196,7 @@ def analysed(log: Opened, choice: AnalysisChoice, asked: Asked) -> Analysis:
 
 
 @call(*OF_REPORT, also=("reference",))
-def compare(logs: Opened | OpenedLogs, asked: Asked) -> "pl.DataFrame":
+def compare(logs: Logs, asked: Asked) -> "pl.DataFrame":
     """Each observer's error against a reference, the columns those of ``errors.csv``."""
     if asked.words.get("reference") is None:
         raise ParameterError("compare needs reference=: two-cycle, sensor, vendor, zero, …")
@@ -214,14 +205,14 @@ def compare(logs: Opened | OpenedLogs, asked: Asked) -> "pl.DataFrame":
 
 
 @call(*OF_LOG)
-def thresholds(free: Opened | OpenedLogs, asked: Asked, rate: float = 1.0) -> "Thresholds":
+def thresholds(free: Logs, asked: Asked, rate: float = 1.0) -> "Thresholds":
     """Thresholds that motion like that of contact-free logs exceeds at a rate. [1/h]"""
     logs = several(free)
     return free_thresholds(logs, choice_for(asked, logs), rate)[2]
 
 
 @call(*OF_CONTACTS, Task, GoalChoice, RefinementChoice, also=("method",))
-def identify(logs: Opened | OpenedLogs, asked: Asked, *, check: OpenedLogs = ()) -> Robot:
+def identify(logs: Logs, asked: Asked, *, check: OpenedLogs = ()) -> Robot:
     """The robot that logs of free motion show; `Robot.save` writes its file."""
     paths, task, goal = several(logs), asked.of(Task), asked.of(GoalChoice)
     if task.method == "gains":
@@ -235,11 +226,9 @@ def identify(logs: Opened | OpenedLogs, asked: Asked, *, check: OpenedLogs = ())
     return identified(paths, check, replace(choice, examiner=examiner), task).robot
 
 
+@checked_call
 def simulate(
-    scenario: str | Path,
-    *,
-    seed: int | None = None,
-    settings: Mapping[str, object] | None = None,
+    scenario: str | Path, *, seed: int | None = None, settings: Mapping[str, object] | None = None
 ) -> Recording:
     """The log of a simulated experiment, with true forces (polars) in its `truth`.
 

@@ -113,13 +113,7 @@ def show_answers(
     from vftcli.outputs.error_tables import to_terminal
     from vftcli.outputs.grid import terminal
     from vftcli.outputs.grids import print_grid
-    from vftcli.outputs.screen import (
-        FILE_LINES,
-        MOST_LINES,
-        first_lines,
-        log_screen,
-        logs_screen,
-    )
+    from vftcli.outputs.screen import FILE_LINES, MOST_LINES, first_lines, log_screen, logs_screen
 
     if len(analyses) + len(failed) > 1:
         show(logs_screen(analyses, canvas(), failed, every=details))

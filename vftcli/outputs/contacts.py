@@ -241,14 +241,13 @@ def contacts_csv(lists: Sequence[ContactList]) -> str:
 
 
 def hardest_rows(contacts: Sequence[Contact], most: int = MOST_ROWS) -> list[Contact]:
-    """At most `most` contacts, those of the largest force, in time order."""
-    order = sorted(contacts, key=by_force, reverse=True)
+    """At most `most` contacts, first those of known size by force, in time order."""
+    order = sorted(
+        contacts,
+        key=lambda c: (c.size_known, c.peak_force or 0.0, c.evidence or 0.0),
+        reverse=True,
+    )
     return sorted(order[:most], key=lambda contact: contact.start)
-
-
-def by_force(contact: Contact) -> tuple[bool, float, float]:
-    """Sort key of contacts: known size first, then force, then evidence."""
-    return contact.size_known, contact.peak_force or 0.0, contact.evidence or 0.0
 
 
 def contact_grid(contacts: Sequence[Contact]) -> Grid:

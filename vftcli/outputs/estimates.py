@@ -102,7 +102,12 @@ def write_groups(path: Path, groups: Iterable[Group], csv: Path | None = None) -
                 continue
             table = estimates_table(analysis, rows)
             if schema is None:
-                schema = described_schema(table, frames_of(analysis), doubts_of(analysis))
+                frames = {
+                    f"{kind}/{wrench.name}": StatedFrame(FRAMES[wrench.frame])
+                    for wrench in analysis.wrenches
+                    for kind in ("wrench", "wrench_sd", "wrench_masked")
+                }
+                schema = described_schema(table, frames, doubts_of(analysis))
                 writer = ParquetWriter(file, schema, write_statistics=False, **how)
                 files.enter_context(writer)
                 if csv is not None:
@@ -118,15 +123,6 @@ def doubts_of(analysis: Analysis) -> dict[str, str]:
     """Doubts for the table's metadata."""
     doubts = overridden_lines(analysis.examinations)
     return {"vftcli": json.dumps({"overridden": doubts})} if doubts else {}
-
-
-def frames_of(analysis: Analysis) -> dict[str, StatedFrame]:
-    """The columns of each wrench, without the axis → their frame."""
-    return {
-        f"{kind}/{wrench.name}": StatedFrame(FRAMES[wrench.frame])
-        for wrench in analysis.wrenches
-        for kind in ("wrench", "wrench_sd", "wrench_masked")
-    }
 
 
 #: Flag → name of its file.

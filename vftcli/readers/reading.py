@@ -23,7 +23,7 @@ from vftcli.readers.opening import HEAD_BYTES, LogFile, open_log, sha256_of
 from vftcli.readers.reader import ALL, RawLog, ReadChoice, episode_of
 from vftcli.readers.table import listed
 from vftcli.signals.errors import LogError, ParameterError, UnknownFormatError
-from vftcli.signals.parsing import did_you_mean, printable, tables_beside
+from vftcli.signals.parsing import checked_call, did_you_mean, printable, tables_beside
 from vftcli.signals.recording import Recording
 
 
@@ -92,6 +92,7 @@ FORMATS = {
 }
 
 
+@checked_call
 def read(
     path: str | Path,
     *,
@@ -120,11 +121,10 @@ def read(
         LogError: If the file cannot be read as what it is, or has no such episode or arm.
         ClockError: If its clock stops, runs backwards or holds no samples.
     """
-    wanted = frozenset(signals) if signals is not None else None
     choice = ReadChoice(
         format=format,
         columns=columns,
-        signals=wanted,
+        signals=None if signals is None else frozenset(signals),
         episode=episode,
         arm=arm,
         interval=ReadChoice.option("interval").read(interval),
@@ -134,8 +134,6 @@ def read(
 
 def read_chosen(path: str | Path, choice: ReadChoice, label: str = "") -> Recording:
     """Read a log whole, as `read` does, in the way a choice says."""
-    if not isinstance(path, str | Path):
-        raise ParameterError(f"the log is {path!r}; expected the name of a file or folder")
     path = Path(path)
     if choice.episode == ALL:
         raise ParameterError(

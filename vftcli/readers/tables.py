@@ -9,12 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from vftcli.readers.aliases import (
-    TABLE,
-    along_arm,
-    picks_by_alias,
-    robot_of,
-)
+from vftcli.readers.aliases import TABLE, along_arm, picks_by_alias, robot_of
 from vftcli.readers.columns import Cell, Item, guess_columns, parse_columns, tick_of
 from vftcli.readers.delimited import EchoTable, TextTable, joint_names
 from vftcli.readers.opening import LogFile

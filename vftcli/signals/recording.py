@@ -21,12 +21,7 @@ from vftcli.signals.arrays import (
     release,
     seal,
 )
-from vftcli.signals.errors import (
-    ClockError,
-    MissingSignalError,
-    ParameterError,
-    ShapeError,
-)
+from vftcli.signals.errors import ClockError, MissingSignalError, ParameterError, ShapeError
 from vftcli.signals.option import interval_text
 from vftcli.signals.remarks import Remark, fact
 from vftcli.signals.shown import ALL, Shown, TimeSeries, per_joint, record
