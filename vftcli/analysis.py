@@ -12,7 +12,7 @@ from vftcli.robots.robot import Robot
 from vftcli.robots.run import Run, RunSamples
 from vftcli.signals.arrays import Array
 from vftcli.signals.external_torque import ExternalTorque
-from vftcli.signals.parsing import checked_call, counted
+from vftcli.signals.parsing import counted
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, Remarks
 from vftcli.signals.shown import Several, Shown, joined, record
@@ -122,7 +122,6 @@ class Analysis(Shown):
         last = () if reference is None else (replace(reference, name="reference"),)
         return Several((*self.virtual_sensor.wrenches, *last))
 
-    @checked_call
     def plot(
         self,
         what: str = "contacts",
@@ -144,7 +143,6 @@ class Analysis(Shown):
         figure: Figure = draw(self, what, joints, observers)
         return figure
 
-    @checked_call
     def save(self, folder: str | Path, *, force: bool = False) -> None:
         """Write page, recording, tables, estimates into a folder, as `vftcli report`."""
         write = import_module("vftcli.outputs.report").write_report

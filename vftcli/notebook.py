@@ -45,12 +45,11 @@ from vftcli.pipeline import (
     prepared,
 )
 from vftcli.readers.reader import ReadChoice
-from vftcli.readers.reading import Library
+from vftcli.readers.reading import Library, checked_call
 from vftcli.robots import RobotChoice
 from vftcli.robots.robot import Robot
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.option import Anyway, Asked, Choice, settings_as_typed
-from vftcli.signals.parsing import checked_call
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remarks
 from vftcli.wrench import AlsoWrench, WrenchChoice

@@ -7,14 +7,15 @@ import os
 import re
 import shlex
 from collections import Counter
-from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
-from functools import partial
+from functools import partial, wraps
 from importlib import import_module
+from inspect import signature
 from pathlib import Path
 from types import ModuleType
-from typing import NamedTuple
+from typing import Any, NamedTuple, ParamSpec, TypeVar
 
 import numpy as np
 
@@ -23,7 +24,7 @@ from vftcli.readers.opening import HEAD_BYTES, LogFile, open_log, sha256_of
 from vftcli.readers.reader import ALL, RawLog, ReadChoice, episode_of
 from vftcli.readers.table import listed
 from vftcli.signals.errors import LogError, ParameterError, UnknownFormatError
-from vftcli.signals.parsing import checked_call, did_you_mean, printable, tables_beside
+from vftcli.signals.parsing import did_you_mean, printable, tables_beside
 from vftcli.signals.recording import Recording
 
 
@@ -90,6 +91,36 @@ FORMATS = {
     name: LogFormat(name=name, **entry.pop("reader"), **entry)
     for name, entry in tables_beside(__file__, "layouts.toml").items()
 }
+
+
+P = ParamSpec("P")
+R = TypeVar("R")
+#: What a call declares where it wants a file.
+FILE_NAMES = (str | Path, str | Path | None)
+
+
+def checked_call(function: Callable[P, R]) -> Callable[P, R]:
+    """A function for notebooks; wrong arguments raise a ParameterError."""
+    name, shown = f"vft.{function.__qualname__}", signature(function)
+
+    @wraps(function)
+    def called(*places: P.args, **given: P.kwargs) -> R:
+        for word in given.keys() - shown.parameters.keys():
+            near = did_you_mean(word, shown.parameters)
+            raise ParameterError(f"{name} has no keyword {word}.{near}")
+        try:
+            values = shown.bind(*places, **given).arguments
+        except TypeError as error:
+            raise ParameterError(f"{name}: {error}") from None
+        for word, value in values.items():
+            kind: Any = shown.parameters[word].annotation
+            if kind in FILE_NAMES and not isinstance(value, kind):
+                raise ParameterError(f"{name}: {word} is {value!r}; expected the name of a file")
+        if not isinstance(values.get("settings") or {}, Mapping):
+            raise ParameterError(f"{name}: settings are a dict, as {{'duration': 8}}")
+        return function(*places, **given)
+
+    return called
 
 
 @checked_call

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 from vftcli.signals.errors import RobotError
 from vftcli.signals.option import LOG, Choice, Option
 from vftcli.signals.packages import door
-from vftcli.signals.parsing import check_known, checked_call, did_you_mean
+from vftcli.signals.parsing import check_known, did_you_mean
 
 if TYPE_CHECKING:
     from vftcli.robots.chain import Chain, Payload
@@ -57,7 +57,6 @@ def profiles_of(joints: int) -> list[str]:
 ARGUMENT = re.compile(r"\s+(?=[^\s:=]+:=)")
 
 
-@checked_call
 def load_robot(robot: "str | Path | Robot", *, tip: str = "") -> "Robot":
     """Load a robot by profile name, robot file (TOML) or description.
 

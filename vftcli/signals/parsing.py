@@ -2,12 +2,11 @@
 
 import re
 import unicodedata
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable
 from difflib import get_close_matches
-from functools import cache, wraps
-from inspect import signature
+from functools import cache
 from pathlib import Path
-from typing import Any, ParamSpec, TypeVar
+from typing import Any
 
 from vftcli.signals.errors import ParameterError
 
@@ -15,10 +14,6 @@ from vftcli.signals.errors import ParameterError
 HALVES = re.compile(r"[\ud800-\udfff]")
 #: Words without width, as colours.
 COLOUR = re.compile(r"\x1b\[[0-9;]*m")
-P = ParamSpec("P")
-R = TypeVar("R")
-#: What a call declares where it wants a file.
-FILE_NAMES = (str | Path, str | Path | None)
 #: Unicode categories that a terminal acts on or hides: controls, writing direction, line ends.
 HIDDEN = {"Cc", "Cf", "Co", "Zl", "Zp"}
 
@@ -74,30 +69,6 @@ def check_known(word: str, known: Iterable[str], complaint: str) -> None:
     if word not in (there := list(known)):
         near = did_you_mean(word, there)
         raise ParameterError(f"{complaint}; there is {', '.join(there)}{'.' * bool(near)}{near}")
-
-
-def checked_call(function: Callable[P, R]) -> Callable[P, R]:
-    """A function for notebooks; wrong arguments raise a ParameterError."""
-    name, shown = f"vft.{function.__qualname__}", signature(function)
-
-    @wraps(function)
-    def called(*places: P.args, **given: P.kwargs) -> R:
-        for word in given.keys() - shown.parameters.keys():
-            near = did_you_mean(word, shown.parameters)
-            raise ParameterError(f"{name} has no keyword {word}.{near}")
-        try:
-            values = shown.bind(*places, **given).arguments
-        except TypeError as error:
-            raise ParameterError(f"{name}: {error}") from None
-        for word, value in values.items():
-            kind: Any = shown.parameters[word].annotation
-            if kind in FILE_NAMES and not isinstance(value, kind):
-                raise ParameterError(f"{name}: {word} is {value!r}; expected the name of a file")
-        if not isinstance(values.get("settings") or {}, Mapping):
-            raise ParameterError(f"{name}: settings are a dict, as {{'duration': 8}}")
-        return function(*places, **given)
-
-    return called
 
 
 def check_kind(value: object, kind: type, name: str, how: str) -> None:
