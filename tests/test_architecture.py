@@ -244,14 +244,14 @@ def test_a_file_fits_a_few_screens() -> None:
 
 
 MOST = {
-    "lines of Python": 50_694,
+    "lines of Python": 50_690,
     "files": 210,
-    "functions": 2707,
+    "functions": 2705,
     "functions over 60 lines": 8,
-    "names, operators, numbers": 364_020,
+    "names, operators, numbers": 364_000,
     "characters a line that is not blank": 50.11,
     "noqa": 70,
-    "lines of TOML, JavaScript, CSS": 7265,
+    "lines of TOML, JavaScript, CSS": 7258,
 }
 """The size of the package: whoever makes it smaller lowers these, nobody raises them."""
 

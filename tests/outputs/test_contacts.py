@@ -193,9 +193,11 @@ def test_trust_says_why(changed, words):
          "A push along one axis may go unseen: the pose hardly shows it."),
         ({"basis": "whole log", "contacts": (contact(),)},
          "Pushes below 6 N, or through half of the log, may not show."),
-        ({"candidates": (contact(),)}, "Pushes below 6 N may not show. 1 candidate more: --all."),
+        ({"candidates": (contact(),)},
+         "Pushes below 6 N may not show. 1 candidate more: contacts --all."),
         ({"candidates": (contact(), contact(number=2)), "basis": "friction"},
-         "Pushes below 6 N, or through half of the log, may not show. 2 candidates more: --all."),
+         "Pushes below 6 N, or through half of the log, may not show. 2 candidates more: "
+         "contacts --all."),
         ({"smallest_force": 3473.0},
          "A push along one axis may go unseen: the pose hardly shows it."),
     ],

@@ -50,7 +50,7 @@ def otherwise(found: ContactList) -> str:
         return "A push along one axis may go unseen: the pose hardly shows it."
     if not found.tells_untouched:
         others = found.candidates
-        more = f" {counted(len(others), 'candidate')} more: --all." if others else ""
+        more = f" {counted(len(others), 'candidate')} more: contacts --all." if others else ""
         long = "" if found.basis == "free motion" else ", or through half of the log,"
         return f"Pushes below {at_least_shown(least)}{long} may not show.{more}"
     rest = f"{'Nothing else' if found.contacts else 'Nothing'} above {at_least_shown(least)}"
