@@ -57,8 +57,7 @@ def test_a_robot_is_loaded_once_and_guessed_where_the_makers_model_tells_it():
     with pytest.raises(RobotError, match=r"^Which arm\? Best fits: ur5e \(.* Add --robot ur5e$"):
         examiner.robot(log, RobotChoice())
     with pytest.raises(
-        RobotError,
-        match=r"^Which arm\? Best fits: .* \(\d{2,3} %\), .* \(\d{2,3} %\); none explains",
+        RobotError, match=r"^Which arm\? No profile fits; nearest is .* --robot FILE"
     ):
         examiner.robot(turned(log), RobotChoice())
     with pytest.raises(MissingSignalError, match="positions alone carry no force; it has q, dq"):
