@@ -186,7 +186,7 @@ class FreeMotion(Shown):
         given = choice.is_given or bool(self.runs)
         if not given and np.ptp(log.recording.q, axis=0).max() < SWAY:
             raise ReferenceTorqueError(
-                f"{log.name}: no joint moves {SWAY:g} rad, so no cycle of it is free motion: --free"
+                f"{log.name}: no joint moves {SWAY:g} rad, so no cycle of it is free motion"
             )
         if choice.cycles or not given:
             found = self.free_cycles
