@@ -141,3 +141,14 @@ def test_a_load_is_the_payload_that_weighs_as_much(mass, sd, name):
     carried = CarriedLoad.of(load, run)
     assert (carried.mass, carried.sd, carried.payload) == (mass, sd, name)
     assert carried.span == pytest.approx((2.1, 6.9))
+
+
+def test_a_log_that_should_be_free_names_its_longest_free_span_without_forces_too():
+    """Contacts at 2 to 3 s and 7 to 8 s of 0 to 20 s leave 8 to 20 s."""
+    found = contact_list(contact(start=2.0, stop=3.0), contact(start=7.0, stop=8.0))
+    for listed in (found, found.without_forces()):
+        (remark,) = listed.not_free(np.array([0.0, 20.0]))
+        values = remark.values
+        assert (values["begin_s"], values["end_s"], values["spans"]) == (8.0, 20.0, 2)
+    assert "N·m" in values["size"]
+    assert list(contact_list().not_free(np.array([0.0, 20.0]))) == []

@@ -327,16 +327,16 @@ class ContactList(Shown):
 
     def not_free(self, t: Array) -> Iterator[Remark]:
         """A warning if a log (T,) [s] that should be free is not, with its longest free span."""
-        if (hardest := self.hardest) is None:
+        if not self.contacts:
             return
-        inner = (time for row in self.contacts for time in (row.start, row.stop))
-        edges = [t[0], *inner, t[-1]]
+        worst = self.hardest or self.contacts[0]
+        edges = [t[0], *(x for row in self.contacts for x in (row.start, row.stop)), t[-1]]
         spans = zip(edges[::2], edges[1::2], strict=True)
         begin, end = max(spans, key=lambda span: span[1] - span[0])
         yield warning(
             "reference-zero-touched",
-            Where(span=(hardest.start, hardest.stop)),
-            size=hardest.size,
+            Where(span=(worst.start, worst.stop)),
+            size=worst.size,
             spans=len(self),
             # Inwards, so that the span holds no contact.
             begin_s=np.ceil(10.0 * begin) / 10.0,

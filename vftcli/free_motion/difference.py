@@ -359,11 +359,12 @@ def error_model(
     missed, own = np.maximum(LEAST_SHARE, pair.misfit), np.zeros(len(noise))
     if not corrected:
         # The model's torque differentiates momenta: their noise is no motion.
-        momentum, band = at(known, motion.momentum - pair.of_free("momentum")), (low, 2.0 * low)
-        missed, own = (
-            np.ones(len(noise)),
-            pair.cached(
-                "slope", low, lambda: noise_below(t, momentum, moving, step, band, low, slope=1)
+        missed, around = np.ones(len(noise)), (moving, step, (low, 2.0 * low), low)
+        own = pair.cached(
+            "slope",
+            low,
+            lambda: noise_below(
+                t, at(known, motion.momentum - pair.of_free("momentum")), *around, slope=1
             ),
         )
     at_rest = pair.standing.all(axis=1)
