@@ -184,19 +184,21 @@ def test_trust_says_why(changed, words):
 @pytest.mark.parametrize(
     ("changed", "words"),
     [
-        ({}, "Nothing above 6 N. Weaker pushes may not show."),
-        ({"contacts": (contact(),)}, "Nothing else above 6 N. Weaker pushes may not show."),
-        ({"contacts": (contact(peak_force=6.0),)}, "Nothing else above 6 N (less at good poses)."),
+        ({}, "Nothing above 6 N at the flange. Weaker pushes may not show."),
+        ({"contacts": (contact(),)},
+         "Nothing else above 6 N at the flange. Weaker pushes may not show."),
+        ({"contacts": (contact(peak_force=6.0),)},
+         "Nothing else above 6 N at the flange (less at good poses)."),
         ({"contacts": (contact(is_load=True),)}, ""),
         ({"smallest_force": None}, ""),
         ({"smallest_force": np.inf},
          "A push along one axis may go unseen: the pose hardly shows it."),
         ({"basis": "whole log", "contacts": (contact(),)},
-         "Pushes below 6 N, or through half of the log, may not show."),
+         "Flange pushes below 6 N, or through half of the log, may not show."),
         ({"candidates": (contact(),)},
-         "Pushes below 6 N may not show. 1 candidate more: contacts --all."),
+         "Flange pushes below 6 N may not show. 1 candidate: contacts --all."),
         ({"candidates": (contact(), contact(number=2)), "basis": "friction"},
-         "Pushes below 6 N, or through half of the log, may not show. 2 candidates more: "
+         "Flange pushes below 6 N, or through half of the log, may not show. 2 candidates: "
          "contacts --all."),
         ({"smallest_force": 3473.0},
          "A push along one axis may go unseen: the pose hardly shows it."),

@@ -224,7 +224,7 @@ HEADS = "  #  from – to [s]    |F| [N]  range [N]  direction  where  trust"
 ROW = "  {0}    {0}.00 –   4.78   5{0} ± 7      57–78  +y, down   wrist  fair"
 EACH = [*map(ROW.format, (1, 2, 3))]
 END = [
-    "  Nothing else above 6 N. Weaker pushes may not show.",
+    "  Nothing else above 6 N at the flange. Weaker pushes may not show.",
     "  (± 95 %; force ON the robot, base axes; range: over all possible",
     "    places; trust: good within 25 % of |F|, weak beyond 40 % or by little",
     "    evidence)",

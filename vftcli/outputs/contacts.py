@@ -50,10 +50,10 @@ def otherwise(found: ContactList) -> str:
         return "A push along one axis may go unseen: the pose hardly shows it."
     if not found.tells_untouched:
         others = found.candidates
-        more = f" {counted(len(others), 'candidate')} more: contacts --all." if others else ""
+        more = f" {counted(len(others), 'candidate')}: contacts --all." if others else ""
         long = "" if found.basis == "free motion" else ", or through half of the log,"
-        return f"Pushes below {at_least_shown(least)}{long} may not show.{more}"
-    rest = f"{'Nothing else' if found.contacts else 'Nothing'} above {at_least_shown(least)}"
+        return f"Flange pushes below {at_least_shown(least)}{long} may not show.{more}"
+    rest = f"Nothing{' else' * bool(found.contacts)} above {at_least_shown(least)} at the flange"
     if any((c.peak_force or least) < least for c in found.contacts):
         # Along the best axes smaller forces show.
         return f"{rest} (less at good poses)."

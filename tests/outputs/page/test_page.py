@@ -67,7 +67,7 @@ def test_the_answer_comes_first(pushed: Analysis) -> None:
         "ur5_circle.csv · Universal Robots UR5",
         "12 contacts. The hardest, at 5.1 s: 91 ± 7 N on the wrist.",
         "10 on the wrist, 2 at an unknown place. The size of contact 9 is uncertain.",
-        "Nothing else above 2 N. Weaker pushes may not show.", "91 ± 7 N contact 1",
+        "Nothing else above 2 N at the flange. Weaker pushes may not show.", "91 ± 7 N contact 1",
         "91 ± 7 N wrist", "Can it be believed?", "vftcli identify", "Joint torques",
         "Errors against the reference",
     )  # fmt: skip
