@@ -8,13 +8,7 @@ import polars as pl
 import pytest
 
 from vftcli.evaluation.scores import LAGS
-from vftcli.outputs.benchmark import (
-    Results,
-    arm_texts,
-    list_texts,
-    render_benchmark,
-    text_of,
-)
+from vftcli.outputs.benchmark import Results, arm_texts, list_texts, render_benchmark, text_of
 from vftcli.reproduction.scoring import SCHEMA
 
 COMMON = {

@@ -5,13 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from vftcli.reproduction.experiments import (
-    experiments_of,
-    gather,
-    item_grid,
-    run_jobs,
-    spread,
-)
+from vftcli.reproduction.experiments import experiments_of, gather, item_grid, run_jobs, spread
 from vftcli.reproduction.paper import AS_PRINTED, PAPERS
 
 HUANG = PAPERS["huang2025"]
