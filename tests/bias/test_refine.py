@@ -28,9 +28,6 @@ from vftcli.robots import load_robot
 from vftcli.robots.run import Run
 from vftcli.signals.errors import ParameterError
 
-# The band around an estimate: drawn where something is free of contact, from what is known
-
-
 FIXTURE = Path(__file__).parents[2] / "fixtures" / "ur5_circle.csv"
 GMO = MomentumObserver(gain=np.full(6, 20.0))
 
@@ -39,6 +36,11 @@ GMO = MomentumObserver(gain=np.full(6, 20.0))
 def found() -> Baseline:
     log = Run(recording=read(FIXTURE), robot=load_robot("ur5"))
     return baseline_of(FreeMotion(log=log, choice=FreeChoice(cycles=(1,))))
+
+
+@pytest.fixture
+def reading(found):
+    return free_reading(found, GMO, GMO.estimate(found.of(found.motion.log).terms))
 
 
 def corrected(found: Baseline, free, sd: float = 0.0, load: float = 0.0) -> Baseline:
@@ -55,16 +57,14 @@ def corrected(found: Baseline, free, sd: float = 0.0, load: float = 0.0) -> Base
     return replace(found, correction=off)
 
 
-def test_a_correction_adds_its_own_variance(found):
-    reading = free_reading(found, GMO, GMO.estimate(found.of(found.motion.log).terms))
+def test_a_correction_adds_its_own_variance(found, reading):
     known = found.part.own
     plain, wider = (with_band(corrected(found, known, sd), reading).error_sd for sd in (0.0, 0.7))
     # Bands are kept in single precision.
     np.testing.assert_allclose(wider, np.hypot(plain, 0.7), rtol=1e-6)
 
 
-def test_without_spectra_or_free_samples_there_is_none(found):
-    reading = free_reading(found, GMO, GMO.estimate(found.of(found.motion.log).terms))
+def test_without_spectra_or_free_samples_there_is_none(found, reading):
     assert with_band(replace(found, spectra=None), reading).error_sd is None
     nothing = reading._replace(samples=reading.samples[:0], resting=reading.resting[:0])
     assert with_band(found, nothing).error_sd is None
@@ -72,8 +72,7 @@ def test_without_spectra_or_free_samples_there_is_none(found):
     assert [r.code for r in said] == ["no-band"]
 
 
-def test_the_larger_of_what_is_stated_and_what_a_fit_calls_free_counts(found):
-    reading = free_reading(found, GMO, GMO.estimate(found.of(found.motion.log).terms))
+def test_the_larger_of_what_is_stated_and_what_a_fit_calls_free_counts(found, reading):
     quiet = np.arange(found.of(found.motion.log).terms.samples) % 7 == 0
     rests = found.motion.log.rests
     tau = reading.estimate.tau[quiet]
@@ -89,8 +88,7 @@ def test_the_larger_of_what_is_stated_and_what_a_fit_calls_free_counts(found):
     np.testing.assert_array_equal(with_band(corrected(found, few), reading).error_sd, stated)
 
 
-def test_a_slow_load_that_the_fit_believes_in_is_no_error(found):
-    reading = free_reading(found, GMO, GMO.estimate(found.of(found.motion.log).terms))
+def test_a_slow_load_that_the_fit_believes_in_is_no_error(found, reading):
     pushed = reading._replace(estimate=replace(reading.estimate, tau=reading.estimate.tau + 5.0))
     known, alone = found.part.own, replace(found, by_fit=True)
     np.testing.assert_allclose(

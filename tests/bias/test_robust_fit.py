@@ -23,7 +23,6 @@ from vftcli.bias.robust_fit import (
     fit_robustly,
     free_samples,
     guarded,
-    largest_around,
     slow_loads,
 )
 from vftcli.robots import load_robot
@@ -103,13 +102,6 @@ def test_a_log_in_contact_throughout_has_none():
     assert np.count_nonzero(free_samples(worst, 0.02)) == 33
 
 
-def test_the_largest_around_is_a_loop_s():
-    values = np.random.default_rng(2).normal(size=50)
-    expected = [values[max(k - 4, 0) : k + 5].max() for k in range(50)]
-    np.testing.assert_array_equal(largest_around(values, 4), expected)
-    np.testing.assert_array_equal(largest_around(values, 0), values)
-
-
 # Slow external loads: their columns against Pinocchio, their knots against a dense sum
 
 
@@ -139,21 +131,10 @@ def test_a_force_along_the_arm_is_felt_by_the_joints_before_it(name, joints):
         np.testing.assert_allclose(found, -sd * felt, atol=1e-12 * 50.0)
 
 
-@pytest.mark.parametrize("joints", [3, 4, 5])
-def test_on_a_short_arm_elbow_and_wrist_are_one_point(joints):
-    """A wrench of six components at the flange and one force of three along the arm."""
-    loads = slow_loads(shortened(ur10e(), joints).chain, np.arange(4.0), np.zeros((4, joints)))
-    assert loads.torque.shape[2] == 6 + 3
-
-
 @pytest.mark.parametrize(("seconds", "knots"), [(14.0, 1), (16.0, 3), (55.0, 7), (3600.0, 61)])
 def test_knots_lie_ten_seconds_apart(seconds, knots):
     t = np.linspace(0.0, seconds, 40)
-    loads = slow_loads(load_robot("ur5").chain, t, np.zeros((40, 6)))
-    assert loads.knots == knots
-    assert loads.sizes == (0, 6 * knots, 12 * knots)
-    np.testing.assert_allclose(loads.knot + loads.share, t / seconds * (knots - 1), atol=1e-9)
-    assert loads.knot.max() <= max(knots - 2, 0)
+    assert slow_loads(load_robot("ur5").chain, t, np.zeros((40, 6))).knots == knots
 
 
 def test_a_load_runs_straight_from_knot_to_knot():
@@ -171,10 +152,6 @@ def test_a_load_runs_straight_from_knot_to_knot():
             value = values[loads.numbers[k, c]]
             expected += value * hat[:, None] * loads.torque[:, :, c]
     np.testing.assert_allclose(loads.torque_of(values), expected, atol=1e-10)
-    flange = loads.torque_of(values[: loads.sizes[1]])
-    np.testing.assert_allclose(
-        flange, loads.torque_of(np.append(values[: loads.sizes[1]], np.zeros(6 * loads.knots)))
-    )
 
 
 # The normal equations against dense matrices, and the choice of loads against all of them
@@ -231,14 +208,11 @@ def test_no_load_is_believed_where_there_is_none(rows):
     assert len(quiet.solution(quiet.sums(np.ones(rows.d.shape))[0]).loads) == 0
 
 
-# The guard: what does not predict is not used
-
-
 def fit_of(size, noise=0.3):
     """The fit of a model that is wrong by so much, and the velocities at its samples."""
     robot = shortened(ur10e(), 3)
     run = wrong_run(robot, drawn_error(robot, size=size), noise=noise)
-    fit = fit_robustly(fit_rows(run, STEPS), STEPS * STEP, np.array([17.0, 16.0, 6.0]))
+    fit = fit_robustly(fit_rows(run, STEPS), STEPS * STEP, DRY)
     return fit, smooth_motion(run).dq[::STEPS]
 
 

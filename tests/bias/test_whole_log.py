@@ -155,17 +155,6 @@ def test_a_short_log_is_refused():
     assert found.of(run) is run
 
 
-def test_half_a_second_without_samples_costs_no_band():
-    robot = shortened(ur10e(), 3)
-    log = wrong_run(robot, drawn_error(robot), seconds=16.0, noise=0.3).recording
-    there = abs(log.t - 9.0) > 0.25
-    cut = {name: getattr(log, name)[there] for name in ("t", "q", "dq", "torque")}
-    found = whole_log_bias(Run(recording=Recording(**cut), robot=robot))
-    assert found.applied.all()
-    assert np.isfinite(found.bias).all()
-    assert np.all((found.sd > 0.0) & np.isfinite(found.sd))
-
-
 def by_friction(robot, seconds, external=None):
     """A log of an arm that slides by a fifth of its dry friction more than its model knows."""
     error = drawn_error(robot, size=0.0)
@@ -202,37 +191,25 @@ def test_a_hand_that_leads_is_no_friction():
     assert not found.bias.any()
 
 
-def held(seconds, moving):
-    """A pose that is held but for `moving` seconds at either end. (T, n)"""
-    robot = shortened(ur10e(), 3)
-    t = STEP * np.arange(round(seconds / STEP))
-    on = ((t < moving) | (t > seconds - moving))[:, None]
-    _, dq, _ = motion(t, 3)
-    dq = dq * on
+@pytest.mark.parametrize(
+    ("seconds", "spans", "code", "moved"),
+    [
+        (60.0, ((0.0, 1.0), (59.0, 60.0)), "whole-log-at-rest", 2.0),  # 3 % of 59 s
+        (20.0, (), "whole-log-at-rest", 0.0),
+        (20.0, ((0.0, 2.0),), "whole-log-little-motion", 2.0),
+    ],
+)
+def test_a_log_that_hardly_moves_is_refused(seconds, spans, code, moved):
+    robot, t = shortened(ur10e(), 3), STEP * np.arange(round(seconds / STEP))
+    on = np.any([(a <= t) & (b > t) for a, b in spans] or [t < 0.0], axis=0)
+    dq = motion(t, 3)[1] * on[:, None]
     q = np.cumsum(STEP * dq, axis=0)
-    recording = Recording(t=t, q=q, dq=dq, torque=np.ones_like(q))
-    return Run(recording=recording, robot=robot)
-
-
-def test_a_held_pose_is_refused():
-    """One of 60 s moves at either end: 59 s from first to last, 3 % of motion."""
-    (remark,) = whole_log_bias(held(60.0, 1.0)).remarks
-    assert remark.code == "whole-log-at-rest"
+    run = Run(recording=Recording(t=t, q=q, dq=dq, torque=np.ones_like(q)), robot=robot)
+    (remark,) = whole_log_bias(run).remarks
+    assert remark.code == code
     # the filter smears each end by some tenths of a second
-    assert remark.values["motion_s"] == pytest.approx(2.0, abs=0.5)
-    (still,) = whole_log_bias(held(20.0, 0.0)).remarks
-    assert (still.code, still.values["motion_s"]) == ("whole-log-at-rest", 0.0)
-    assert "model error not corrected" in str(still)
-
-
-def test_a_log_that_moves_only_for_a_while_is_refused():
-    """2 s of motion at the start of 20 s."""
-    run = held(20.0, 2.0)
-    dq = np.where(run.recording.t[:, None] < 10.0, run.recording.require("dq"), 0.0)
-    (remark,) = whole_log_bias(replace(run, recording=replace(run.recording, dq=dq))).remarks
-    assert remark.code == "whole-log-little-motion"
-    # the filter smears its end by some tenths of a second
-    assert remark.values["motion_s"] == pytest.approx(2.0, abs=0.5)
+    assert remark.values["motion_s"] == pytest.approx(moved, abs=0.5 * (moved > 0.0))
+    assert "model error not corrected" in str(remark)
 
 
 def test_what_no_arm_does_is_refused():
