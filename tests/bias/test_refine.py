@@ -10,13 +10,7 @@ from sound_logs import UR10E
 
 from vftcli.bias import AUTOMATIC, REMOVALS, RefinementChoice
 from vftcli.bias.baseline import Baseline, Baselines, baseline_of, free_reading
-from vftcli.bias.refine import (
-    STICTION,
-    band_remarks,
-    friction_share,
-    limits_remark,
-    with_band,
-)
+from vftcli.bias.refine import STICTION, band_remarks, friction_share, limits_remark, with_band
 from vftcli.bias.whole_log import WholeLogBias, stride_of
 from vftcli.evaluation.references import paper_gap
 from vftcli.free_motion import FreeChoice

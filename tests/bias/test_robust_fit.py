@@ -18,13 +18,7 @@ from known_errors import (
 )
 
 from vftcli.bias.model_error import smooth_motion
-from vftcli.bias.robust_fit import (
-    faded,
-    fit_robustly,
-    free_samples,
-    guarded,
-    slow_loads,
-)
+from vftcli.bias.robust_fit import faded, fit_robustly, free_samples, guarded, slow_loads
 from vftcli.robots import load_robot
 from vftcli.signals.rest import MOVES
 

@@ -150,10 +150,7 @@ def test_brakes_are_cut_out_with_the_half_second_beside():
 
 def test_a_blow_is_no_bad_sample(circle):
     """As large and as short as a bad sample, but the arm's speed changes with it."""
-    blow = [
-        changed("current", 1, lambda x: x + 12, 3),
-        changed("dq", 9999, lambda x: x - 0.2, 3),
-    ]
+    blow = [changed("current", 1, lambda x: x + 12, 3), changed("dq", 9999, lambda x: x - 0.2, 3)]
     assert "isolated-effort" not in examined(planted(circle, *blow))[1]
 
 
