@@ -1,7 +1,6 @@
 """Replay: forces from every source, joints, comparison figures, remarks."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import polars as pl
@@ -75,7 +74,7 @@ def codes(found: Replay) -> set[str]:
     return {remark.code for remark in found.remarks}
 
 
-def test_soft_travel_is_plausible_and_hard_is_said_not_to_be() -> None:
+def test_soft_travel_is_plausible_and_hard_is_said_not_to_be():
     """24 N for 2 s: 4 N of excess move K = 8 N/m by ≈ 0.6 m at most; the whole 24 N by metres."""
     soft = run(push(), "threshold_mode=soft", alphas=(1.0, 1.9))
     hard = run(push(), alphas=(1.0, 1.9))
@@ -86,7 +85,7 @@ def test_soft_travel_is_plausible_and_hard_is_said_not_to_be() -> None:
     assert "travel-implausible-hard" in codes(hard)
 
 
-def test_rows_say_what_happened() -> None:
+def test_rows_say_what_happened():
     found = run(push(), "threshold_mode=soft", alphas=(1.0, 1.9))
     assert [(r["controller"], r["alpha"], r["axis"]) for r in found.rows] == [
         ("traditional", None, "y"),
@@ -109,7 +108,7 @@ def test_rows_say_what_happened() -> None:
     assert found.rows[2]["peak_advance_s"] > 0.0  # the release's brake acts sooner
 
 
-def test_as_printed_a_force_below_the_threshold_moves_the_arm() -> None:
+def test_as_printed_a_force_below_the_threshold_moves_the_arm():
     """5 N of 20 for 20 s: to F/K_d and F/(αK_d); as corrected not at all.
 
     The slower decays with B/2M = .83 1/s: after 20 s 6e-8 is left.
@@ -122,14 +121,14 @@ def test_as_printed_a_force_below_the_threshold_moves_the_arm() -> None:
     assert not run((record, q)).motion.x.any()
 
 
-def test_work_of_a_constant_force_is_force_times_way() -> None:
+def test_work_of_a_constant_force_is_force_times_way():
     found = run(push(), "threshold_mode=soft")
     x = found.motion.x[:, 0, 1]
     way = x[round(3.0 / 0.008)] - x[round(1.0 / 0.008)]
     assert found.rows[0]["work_J"] == pytest.approx(24.0 * way, rel=1e-9)  # a sum of equal terms
 
 
-def test_joints_follow_the_flange() -> None:
+def test_joints_follow_the_flange():
     """The joint positions put the flange where the deviation says, rotation included."""
     record, q = push(21.0)
     wrench = record.values.copy()
@@ -149,7 +148,7 @@ def test_joints_follow_the_flange() -> None:
     assert np.max(np.abs(np.diff(found.path.q, axis=0))) < 0.1  # no branch is changed
 
 
-def test_the_arm_waits_where_it_cannot_follow() -> None:
+def test_the_arm_waits_where_it_cannot_follow():
     x = np.zeros((30, 1, 6))
     x[10:19, 0, 0] = 3.0  # out of reach for nine rows, and one that is nowhere
     x[19] = np.nan
@@ -161,7 +160,7 @@ def test_the_arm_waits_where_it_cannot_follow() -> None:
     assert not np.allclose(path.q[25, 0], START)
 
 
-def test_speed_is_a_share_of_the_limit_between_reached_samples() -> None:
+def test_speed_is_a_share_of_the_limit_between_reached_samples():
     q = np.zeros((4, 2, 6))
     q[1:, 0, 2] = 0.02
     q[2:, 0, 4] = 5.0  # a leap to a pose that is not reached
@@ -172,7 +171,7 @@ def test_speed_is_a_share_of_the_limit_between_reached_samples() -> None:
     assert np.isnan(largest_speed(UR5, q, np.zeros((4, 2), dtype=bool), 0.01)).all()
 
 
-def test_redundant_arm_stays_inside_its_limits() -> None:
+def test_redundant_arm_stays_inside_its_limits():
     panda = load_robot("panda")
     q = np.array(panda.admittance["start"])
     x = np.zeros((400, 1, 6))
@@ -185,7 +184,7 @@ def test_redundant_arm_stays_inside_its_limits() -> None:
     np.testing.assert_array_equal(path.q[lost:, 0], np.tile(path.q[lost - 1, 0], (400 - lost, 1)))
 
 
-def test_a_start_outside_the_limits_and_no_deviation_are_refused() -> None:
+def test_a_start_outside_the_limits_and_no_deviation_are_refused():
     record, q = push()
     q[:, 5] = 7.0
     with pytest.raises(ParameterError, match=r"joint 6 is at 7 rad and may be -6\.283 to 6\.283"):
@@ -197,7 +196,7 @@ def test_a_start_outside_the_limits_and_no_deviation_are_refused() -> None:
         replay_release(np.zeros(6), UR5, controllers(p), start=START)
 
 
-def test_a_log_that_is_nearly_all_gap_is_refused() -> None:
+def test_a_log_that_is_nearly_all_gap_is_refused():
     """An hour in a log of seconds would be replayed at the control period."""
     record, q = push()
     late = replace(record, t=record.t + 3600.0 * (np.arange(len(record.t)) > 20))
@@ -205,7 +204,7 @@ def test_a_log_that_is_nearly_all_gap_is_refused() -> None:
         run((late, q))
 
 
-def test_quiet_log_moves_nothing_and_says_so() -> None:
+def test_quiet_log_moves_nothing_and_says_so():
     found = run(push(19.0))
     assert found.rows == ()
     np.testing.assert_array_equal(found.motion.x, 0.0)
@@ -215,7 +214,7 @@ def test_quiet_log_moves_nothing_and_says_so() -> None:
     assert remark.values["share"] == pytest.approx(19.0 / 20.0)
 
 
-def test_w_never_rises_in_a_replay() -> None:
+def test_w_never_rises_in_a_replay():
     record, q = push(30.0)
     wrench = record.values.copy()
     wrench[:, 4] = 0.3 * wrench[:, 1]
@@ -226,7 +225,7 @@ def test_w_never_rises_in_a_replay() -> None:
         assert np.nanmax(np.diff(own, axis=0)) <= 1e-12 * np.nanmax(own)
 
 
-def test_release_without_a_limit_inside_the_bound_is_let_pass() -> None:
+def test_release_without_a_limit_inside_the_bound_is_let_pass():
     p = parameters("position.speed_limit=none")
     x = np.array([0.2, 0, 0, 0, 0, 0])
     found = replay_release(x, UR5, controllers(p), start=START)
@@ -242,7 +241,7 @@ def test_release_without_a_limit_inside_the_bound_is_let_pass() -> None:
     assert {"motion-escaped", "law-escapes"} <= codes(studied)
 
 
-def test_a_force_that_is_not_known_counts_as_none_and_is_reported() -> None:
+def test_a_force_that_is_not_known_counts_as_none_and_is_reported():
     wrench, q = push()
     hidden = (wrench.t > 1.5) & (wrench.t < 1.7)
     found = run((replace(wrench, masked=hidden), q), "threshold_mode=soft")
@@ -251,7 +250,7 @@ def test_a_force_that_is_not_known_counts_as_none_and_is_reported() -> None:
     assert not found.phases.dragged[hidden].any()
 
 
-def test_control_clock_takes_the_newest_sample() -> None:
+def test_control_clock_takes_the_newest_sample():
     t = np.arange(41) * 0.001
     clock, seen = on_control_clock(t, 0.0025)
     np.testing.assert_allclose(clock, np.arange(17) * 0.0025, atol=1e-15)
@@ -261,14 +260,9 @@ def test_control_clock_takes_the_newest_sample() -> None:
     np.testing.assert_array_equal(kept, np.arange(500))
 
 
-# What is said of a replay: each remark where it is due, and nowhere else
-
-
-PARAMETERS = from_table(load_robot("ur5").admittance, "ur5", {})
+PARAMETERS = parameters()
 TWO = controllers(PARAMETERS)
 ROWS = 51
-
-
 REST = np.zeros((ROWS, 2, 6))
 
 
@@ -302,12 +296,12 @@ def replayed(
     return found
 
 
-def test_nothing_is_said_of_a_replay_without_trouble() -> None:
+def test_nothing_is_said_of_a_replay_without_trouble():
     assert not [*trouble(replayed())]
     assert not [*trouble(replayed(logged=np.full((5, 6), 0.005)))]
 
 
-def test_each_limit_is_reported_with_its_number_and_its_controller() -> None:
+def test_each_limit_is_reported_with_its_number_and_its_controller():
     (x, v), reached = np.zeros((2, ROWS, 2, 6)), np.ones((ROWS, 2), bool)
     x[20:, 1, 0] = v[20:, 1, 0] = np.inf
     limit = PARAMETERS.speed_limit
@@ -333,7 +327,7 @@ def test_each_limit_is_reported_with_its_number_and_its_controller() -> None:
 @pytest.mark.parametrize(
     ("mode", "code"), [("hard", "travel-implausible-hard"), ("soft", "travel-implausible")]
 )
-def test_travel_counts_where_poses_are_out_of_reach(mode: str, code: str) -> None:
+def test_travel_counts_where_poses_are_out_of_reach(mode, code):
     x = np.zeros((ROWS, 2, 6))
     x[10, 0, :3], x[10, 1, :3] = [9.0, 0, 0], [0.6, 0.8, 0]
     reached = np.ones((ROWS, 2), dtype=bool)
@@ -344,7 +338,7 @@ def test_travel_counts_where_poses_are_out_of_reach(mode: str, code: str) -> Non
     assert remark.values["travel_m"] == pytest.approx(1.0)  # not the other controller's 9 m
 
 
-def test_the_axis_nearest_to_its_threshold_is_named() -> None:
+def test_the_axis_nearest_to_its_threshold_is_named():
     wrench = np.zeros((10, 6))
     wrench[4, 0], wrench[5, 4] = -10.0, 0.75 * PARAMETERS.threshold[4]
     wrench[6] = np.nan
@@ -359,14 +353,11 @@ def drag(begin: int, release: int, axis: int = 2) -> Drag:
     return Drag(axis=axis, number=1, begin=begin, release=release, end=release)
 
 
-def test_the_travel_of_a_log_that_moves_is_reported() -> None:
+def test_the_travel_of_a_log_that_moves_is_reported():
     logged = np.zeros((5, 6))
     logged[3, :3], logged[4, 3:] = [0.03, 0.0, 0.04], 1.0
     (remark,) = trouble(replayed(logged=logged))
     assert remark.values["distance_m"] == pytest.approx(0.05)
-
-
-# What drives a replay: an observer's torque of a file, the log's sensor, or the truth
 
 
 TIMES = np.arange(0.0, 4.0, 0.01)
@@ -377,10 +368,10 @@ LOADED = np.where(TIMES[:, None] > 2.0, 10.0, 0.0) + np.array([1.0, -2.0, 3.0, 0
 
 
 def choice(**zero: object) -> WrenchChoice:
-    return WrenchChoice(frame="base", zero=ZeroChoice(**zero))  # type: ignore[arg-type]
+    return WrenchChoice(frame="base", zero=ZeroChoice(**zero))
 
 
-def test_a_stored_torque_is_turned_into_its_wrench_and_zeroed() -> None:
+def test_a_stored_torque_is_turned_into_its_wrench_and_zeroed():
     tau = np.einsum("tij,ti->tj", flange_jacobian(UR5.chain, POSES), LOADED)
     log = Recording(t=TIMES, q=POSES, tau_ext=tau)
     found = stored_force(log, UR5, choice(spans=((0.0, 1.9),)), "kfo-fe")
@@ -394,7 +385,7 @@ def test_a_stored_torque_is_turned_into_its_wrench_and_zeroed() -> None:
         stored_force(log, UR5, WrenchChoice(frame="base", solver="smoother"), "kfo-fe")
 
 
-def test_the_logs_sensor_drives_as_the_log_states_it() -> None:
+def test_the_logs_sensor_drives_as_the_log_states_it():
     log = Recording(
         t=TIMES, q=POSES, wrench=-LOADED, wrench_frame=WrenchFrame("base", "flange", "by-robot")
     )
@@ -408,7 +399,7 @@ def test_the_logs_sensor_drives_as_the_log_states_it() -> None:
     assert codes == ["wrench-frame-unstated", "sensor-pose-unstated"]
 
 
-def test_a_truth_file_s_wrench_is_the_force_and_torques_alone_are_none(tmp_path: Path) -> None:
+def test_a_truth_file_s_wrench_is_the_force_and_torques_alone_are_none(tmp_path):
     file, axes = tmp_path / "truth.parquet", ("fx", "fy", "fz", "mx", "my", "mz")
     columns = {f"wrench/{axis}": LOADED[:, k] for k, axis in enumerate(axes)}
     pl.DataFrame({"t": TIMES, **columns}).write_parquet(file)

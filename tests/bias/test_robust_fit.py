@@ -82,10 +82,9 @@ def test_weights_count_what_is_correlated_once(pushed):
 def test_short_peaks_are_no_contact_and_contacts_grow():
     """At 20 ms: .08 s are four samples, .25 s twelve (rounded) to either side."""
     worst = np.ones(300)
-    worst[50:53] = 9.0
-    worst[150:154] = 9.0
-    free = free_samples(worst, 0.02)
-    assert np.flatnonzero(~free).tolist() == list(range(150 - 12, 154 + 12))
+    worst[50:53] = worst[150:154] = worst[296:] = 9.0
+    touched = np.flatnonzero(~free_samples(worst, 0.02)).tolist()
+    assert touched == [*range(150 - 12, 154 + 12), *range(296 - 12, 300)]
 
 
 def test_a_log_in_contact_throughout_has_none():

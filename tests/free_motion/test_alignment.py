@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,7 +12,6 @@ from vftcli.readers.reading import read
 from vftcli.signals.errors import ReferenceTorqueError
 from vftcli.signals.recording import Recording
 
-Make = Callable[..., Recording]
 
 
 def wandering(samples: int = 2000, seed: int = 3) -> Recording:
@@ -33,7 +31,7 @@ def cut(log: Recording, first: int, last: int) -> Recording:
     return replace(log, t=log.t[part] - log.t[first], q=log.q[part], dq=log.dq[part])
 
 
-def test_shift_below_the_sample_time_and_rates_that_differ_a_little() -> None:
+def test_shift_below_the_sample_time_and_rates_that_differ_a_little():
     log = wandering()
     found = align(cut(log, 300, 1800), replace(log, t=log.t + 0.1234))
     assert found.shift == pytest.approx(3.1234, abs=1e-6)  # linear interpolation of smooth paths
@@ -44,7 +42,7 @@ def test_shift_below_the_sample_time_and_rates_that_differ_a_little() -> None:
 
 
 @pytest.mark.parametrize("rate", [0.75, 1.05, 1.5, 1000.0])
-def test_rates_that_differ_much_are_refused(rate: float) -> None:
+def test_rates_that_differ_much_are_refused(rate):
     log = wandering()
     log = replace(log, t=log.t[::10], q=log.q[::10], dq=log.dq[::10])
     with pytest.raises(ReferenceTorqueError, match=r"clocks .* run at different rates"):
@@ -54,14 +52,14 @@ def test_rates_that_differ_much_are_refused(rate: float) -> None:
 @pytest.mark.parametrize(
     ("rate", "said"), [(1.02, "2 % slower"), (1.3, "30 % slower"), (0.9, "10 % faster")]
 )
-def test_the_same_motion_at_another_speed_is_no_wrong_clock(rate: float, said: str) -> None:
+def test_the_same_motion_at_another_speed_is_no_wrong_clock(rate, said):
     """A speed slider: stamps and velocities agree with each other."""
     log = wandering()
     with pytest.raises(ReferenceTorqueError, match=rf"ran {said}.*speed slider"):
         align(log, replace(log, t=rate * log.t, dq=log.dq / rate))
 
 
-def test_the_log_with_the_wrong_clock_is_named() -> None:
+def test_the_log_with_the_wrong_clock_is_named():
     log = wandering()
     log = replace(log, source=replace(log.source, label="a"))
     slow = replace(log, t=1.05 * log.t, source=replace(log.source, label="b"))
@@ -72,7 +70,7 @@ def test_the_log_with_the_wrong_clock_is_named() -> None:
             align(own, free)
 
 
-def test_without_velocities_both_causes_are_named() -> None:
+def test_without_velocities_both_causes_are_named():
     log = replace(wandering(), dq=None)
     with pytest.raises(ReferenceTorqueError, match=r"5 % slower, or a clock is wrong.*t@125Hz"):
         align(log, replace(log, t=1.05 * log.t))
@@ -81,7 +79,7 @@ def test_without_velocities_both_causes_are_named() -> None:
         align(replace(log, t=log.t[:1700], q=log.q[300:]), replace(log, t=1.3 * log.t))
 
 
-def test_another_small_motion_is_neither_slower_nor_on_another_clock() -> None:
+def test_another_small_motion_is_neither_slower_nor_on_another_clock():
     """Both stay within the .05 rad of one trajectory, at any rate that is tried."""
     log, other = wandering(seed=3), wandering(seed=5)
     small, still = (replace(x, q=0.08 * x.q, dq=0.08 * x.dq) for x in (log, other))
@@ -96,7 +94,7 @@ def sixth_joint_off(rate: float, begin: float, off: float) -> tuple[Recording, R
     return Recording(t=t, q=moves), Recording(t=rate * t + begin, q=moves + off * np.eye(6)[5])
 
 
-def test_other_trajectories_are_refused_with_what_is_left_at_equal_clocks() -> None:
+def test_other_trajectories_are_refused_with_what_is_left_at_equal_clocks():
     """At 1.02 times the rate and 5 s later the middles, at 11.95 s, lie 5.239 s apart."""
     log, free = sixth_joint_off(1.02, 5.0, 0.5)
     there = np.column_stack([np.interp(log.t + 5.239, free.t, x) for x in free.q.T])
@@ -109,13 +107,13 @@ def test_other_trajectories_are_refused_with_what_is_left_at_equal_clocks() -> N
 @pytest.mark.parametrize(
     ("off", "said"), [(0.055, "ran 50 % faster, or"), (0.07, "not a free run")]
 )
-def test_at_half_the_rate_paths_agree_within_25_mrad(off: float, said: str) -> None:
+def test_at_half_the_rate_paths_agree_within_25_mrad(off, said):
     """One joint of six off by 55 or 70 mrad: 22 or 29 mrad rms."""
     with pytest.raises(ReferenceTorqueError, match=said):
         align(*sixth_joint_off(0.5, 3.0, off))
 
 
-def test_other_arms_are_refused() -> None:
+def test_other_arms_are_refused():
     log = wandering()
     seven = Recording(t=log.t, q=np.column_stack([log.q, log.q[:, 0]]))
     with pytest.raises(ReferenceTorqueError, match="7 joints"):
@@ -126,13 +124,13 @@ def test_other_arms_are_refused() -> None:
     align(replace(log, robot_hint="ur5"), log)  # which says nothing of its arm
 
 
-def test_a_motion_that_hardly_overlaps_at_its_best_shift_is_refused(part_of, circle) -> None:
+def test_a_motion_that_hardly_overlaps_at_its_best_shift_is_refused(part_of, circle):
     log = part_of(circle.recording, 4.0, 8.0)
     with pytest.raises(ReferenceTorqueError, match="not a free run of the trajectory"):
         align(log, replace(log, q=log.q[:, ::-1] + 0.5))
 
 
-def test_a_shared_part() -> None:
+def test_a_shared_part():
     """The first 12 of 20 s are the same motion, then the logs part."""
     log, other = wandering(), wandering(seed=4)
     step = np.concatenate([np.zeros(1200), np.linspace(0.0, 1.0, 100), np.ones(700)])[:, None]
@@ -148,7 +146,7 @@ def test_a_shared_part() -> None:
     )
 
 
-def test_the_ur10e_pair_with_a_payload(logs: Path) -> None:
+def test_the_ur10e_pair_with_a_payload(logs):
     """Documented: after a shift of 1.18 s the positions agree to 0.10 mrad rms."""
     loaded, free = (
         read(logs / "ur10e" / f"{name}_14harm.csv", columns=UR10E) for name in ("load", "free")
@@ -158,7 +156,7 @@ def test_the_ur10e_pair_with_a_payload(logs: Path) -> None:
     assert found.deviation == pytest.approx(0.10e-3, rel=0.1)
 
 
-def test_the_ur3_bags_share_a_part(logs: Path) -> None:
+def test_the_ur3_bags_share_a_part(logs):
     """Documented: they follow the same free motion for 9.8 s within 7 mrad."""
     first, second = (read(logs / "ur3" / f"repeat_{name}.bag") for name in "ab")
     found = align(first, second)
@@ -168,9 +166,7 @@ def test_the_ur3_bags_share_a_part(logs: Path) -> None:
 
 @pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize(("first", "last"), [(0, 1850), (450, 1850), (0, 1400)])
-def test_of_equal_fits_the_longest_overlap_counts(
-    repeated: Make, seed: int, first: int, last: int
-) -> None:
+def test_of_equal_fits_the_longest_overlap_counts(repeated, seed, first, last):
     """Five periods of 3.7 s: noise alone decided which whole period was taken, a part was lost."""
     free = repeated(cycles=5.0, seed=seed)
     loaded = cut(repeated(cycles=5.0, seed=seed + 10, push=0.03), first, last)
@@ -181,7 +177,7 @@ def test_of_equal_fits_the_longest_overlap_counts(
     assert off == pytest.approx(0.0, abs=5e-3)
 
 
-def test_a_path_that_nearly_repeats_is_laid_where_it_is_the_same() -> None:
+def test_a_path_that_nearly_repeats_is_laid_where_it_is_the_same():
     """A spiral, 3 % wider with each turn of 4 s: turns 1 to 3 on turns 2 to 4.
 
     One turn off, all three would overlap, but 3 % apart: thirty times what a servo repeats within.

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -34,31 +33,31 @@ WITHIN = 2e-4
 
 @pytest.mark.parametrize("period", [1.234, 3.7, 4.012])
 @pytest.mark.parametrize("rate", [30.0, 125.0, 1000.0])
-def test_period_below_the_sample_time(repeated: Make, period: float, rate: float) -> None:
+def test_period_below_the_sample_time(repeated, period, rate):
     found = find_period(repeated(period=period, rate=rate))
     assert found.seconds == pytest.approx(period, rel=WITHIN)
 
 
 @pytest.mark.parametrize("push", [0.02, 0.05])
-def test_pushes_do_not_pull_the_period(repeated: Make, push: float) -> None:
+def test_pushes_do_not_pull_the_period(repeated, push):
     """Pushes of 20 and 50 mrad, as a soft servo gives way, three times those of the paper's arm."""
     found = find_period(repeated(push=push, cycles=5.0, rate=125.0))
     assert found.seconds == pytest.approx(3.7, rel=WITHIN)
 
 
-def test_a_last_cycle_that_lacks_a_few_samples_is_whole() -> None:
+def test_a_last_cycle_that_lacks_a_few_samples_is_whole():
     for cycles, whole in ((2.971, 3), (2.969, 2), (-0.25, 0)):
         assert Cycles(period=4.0, begin=1.0, end=1.0 + 4.0 * cycles).whole == whole
 
 
-def test_less_than_a_cycle_and_a_part_of_the_next(repeated: Make) -> None:
+def test_less_than_a_cycle_and_a_part_of_the_next(repeated):
     log = repeated(cycles=0.8)
     said = "only 2.96 s of the motion repeat, less than the period of 3.7 s; give a free run"
     with pytest.raises(ReferenceTorqueError, match=said):
         segment(replace(log, t=log.t + 10.0), Period(3.7, 0.0))
 
 
-def test_all_cycles_together_refine_the_period(repeated: Make) -> None:
+def test_all_cycles_together_refine_the_period(repeated):
     """Ten cycles of 370 samples, 2 mrad of noise: twice the Cramér–Rao bound, 7 µs.
 
     σ_P² = 12 σ²/(M (M² − 1) Σ dq²) of M cycles; one cycle beside the next tells 26 µs.
@@ -72,7 +71,7 @@ def test_all_cycles_together_refine_the_period(repeated: Make) -> None:
 
 
 @pytest.mark.parametrize("turned", [1, -1])
-def test_a_place_crossed_by_accident_begins_no_cycle(repeated: Make, turned: int) -> None:
+def test_a_place_crossed_by_accident_begins_no_cycle(repeated, turned):
     """A way in 1 rad beside the path until 3 s, on it for .3 s at 1 s: .3 of .75 cycles."""
     log = repeated(cycles=4.0)
     beside = (log.t < 3.0) & ~((log.t > 1.0) & (log.t < 1.3))
@@ -82,7 +81,7 @@ def test_a_place_crossed_by_accident_begins_no_cycle(repeated: Make, turned: int
     assert edge == pytest.approx(3.0, abs=0.02)
 
 
-def test_way_in_rests_and_start_amid_a_cycle(repeated: Make) -> None:
+def test_way_in_rests_and_start_amid_a_cycle(repeated):
     log = repeated(approach=2.0, hold=1.0, start=1.3, cycles=3.4)
     period = find_period(log)
     cycles = segment(log, period)
@@ -93,7 +92,7 @@ def test_way_in_rests_and_start_amid_a_cycle(repeated: Make) -> None:
     assert cycles.end == pytest.approx(3.0 + 3.4 * 3.7, abs=0.1)
 
 
-def test_one_and_a_third_cycles_are_enough(repeated: Make) -> None:
+def test_one_and_a_third_cycles_are_enough(repeated):
     log = repeated(cycles=1.33)
     cycles = segment(log, find_period(log))
     assert cycles.whole == 1
@@ -105,9 +104,7 @@ def test_one_and_a_third_cycles_are_enough(repeated: Make) -> None:
     # 3.7 s is just beyond the 3 % around 3.58 s: the deepest place of these is its slope.
     [(7.4, 7.4), (3.75, 3.7), (3.58, 3.7)],
 )
-def test_the_stated_period_decides_between_multiples(
-    repeated: Make, stated: float, seconds: float
-) -> None:
+def test_the_stated_period_decides_between_multiples(repeated, stated, seconds):
     assert find_period(repeated(), stated).seconds == pytest.approx(seconds, abs=1e-4)
 
 
@@ -121,19 +118,19 @@ def test_the_stated_period_decides_between_multiples(
         (0.05, "no repetition found near 0.05 s"),
     ],
 )
-def test_impossible_periods(repeated: Make, stated: float, message: str) -> None:
+def test_impossible_periods(repeated, stated, message):
     with pytest.raises(ReferenceTorqueError, match=message):
         find_period(repeated(), stated)
 
 
-def test_no_repetition(repeated: Make) -> None:
+def test_no_repetition(repeated):
     """Six joints wander off by 20 mrad/s: √6 · 20 mrad/s · 3.7 s = .18 rad a period."""
     wandering = replace(log := repeated(), q=log.q + 0.02 * log.t[:, None])
     with pytest.raises(ReferenceTorqueError, match=r"after 3\.[67]\d* s, .* 0\.18 rad.*--free"):
         find_period(wandering)
 
 
-def test_an_arm_at_rest(repeated: Make) -> None:
+def test_an_arm_at_rest(repeated):
     log = repeated()
     still = replace(log, q=np.tile(log.q[:1], (log.samples, 1)), dq=np.zeros(log.q.shape))
     with pytest.raises(ReferenceTorqueError, match="does not move"):
@@ -147,7 +144,7 @@ def test_an_arm_at_rest(repeated: Make) -> None:
         moving_part(few)
 
 
-def test_sweeps_of_a_real_arm_are_no_repetition(logs: Path) -> None:
+def test_sweeps_of_a_real_arm_are_no_repetition(logs):
     """Single-joint sweeps come back nearly, at another speed each time."""
     log = read(logs / "ur10e" / "jointwise_2.csv", columns=UR10E)
     with pytest.raises(ReferenceTorqueError, match="no repetition"):
@@ -155,13 +152,13 @@ def test_sweeps_of_a_real_arm_are_no_repetition(logs: Path) -> None:
 
 
 @pytest.mark.parametrize("stated", [12.4, 12.5, 12.55])
-def test_a_stated_period_near_the_end_of_the_log(repeated: Make, stated: float) -> None:
+def test_a_stated_period_near_the_end_of_the_log(repeated, stated):
     """The longest that is allowed, .85 of what moves: one lag is left to look at, and it is."""
     log = repeated(period=12.5, cycles=14.78 / 12.5)
     assert find_period(log, stated).seconds == pytest.approx(12.5, rel=1e-3)  # 2.3 s overlap
 
 
-def test_a_clock_of_bursts_leaves_no_lag_to_look_at() -> None:
+def test_a_clock_of_bursts_leaves_no_lag_to_look_at():
     """Eleven samples, half of them at once: six steps of the median, too few for a period."""
     t = np.concatenate([1e-4 * np.arange(5), 0.1 + 0.1 * np.arange(6)])
     q = np.outer(np.sin(20.0 * t), np.ones(6))
@@ -170,7 +167,7 @@ def test_a_clock_of_bursts_leaves_no_lag_to_look_at() -> None:
         find_period(log)
 
 
-def test_positions_alone_tell_where_the_arm_rests(repeated: Make) -> None:
+def test_positions_alone_tell_where_the_arm_rests(repeated):
     """Rests of 1 s before and after 4 cycles of 3.7 s; velocities are differences along time."""
     log = repeated(hold=1.0)
     t, q = moving_part(replace(log, dq=None))
@@ -179,7 +176,7 @@ def test_positions_alone_tell_where_the_arm_rests(repeated: Make) -> None:
     np.testing.assert_array_equal(q, moving_part(log)[1])
 
 
-def test_a_log_that_is_nearly_all_gap_is_refused(repeated: Make) -> None:
+def test_a_log_that_is_nearly_all_gap_is_refused(repeated):
     """A jump of the clock by 10⁶ s: an even series over it would hold 10⁸ samples."""
     log = repeated()
     late = np.arange(log.samples) > log.samples // 2
@@ -223,9 +220,7 @@ def pushed(drive_of: MakesRun) -> Callable[..., Run]:
         ((6.0, 10.0), (0,)),
     ],
 )
-def test_all_cycles_without_a_push_are_free(
-    pushed: Callable[..., Run], instants: tuple[float, ...], free: tuple[int, ...]
-) -> None:
+def test_all_cycles_without_a_push_are_free(pushed, instants, free):
     found = find_free_cycles(pushed(*instants), CYCLES)
     assert found.numbers == free
     assert found.residuals is not None
@@ -233,9 +228,7 @@ def test_all_cycles_without_a_push_are_free(
     assert np.all((found.residuals > 10.0) == ~np.isin(np.arange(3), free))
 
 
-def test_of_cycles_that_are_all_alike_the_last_is_left_to_be_compared(
-    pushed: Callable[..., Run],
-) -> None:
+def test_of_cycles_that_are_all_alike_the_last_is_left_to_be_compared(pushed):
     assert find_free_cycles(pushed(), CYCLES._replace(end=8.0)).numbers == (0,)
     assert find_free_cycles(pushed(), CYCLES._replace(end=6.5)).numbers == (0,)  # the only one
     # The low-pass leaves .066 of the two cycles' √2 · .1 N·m: √(.06² + .066²) is within 1.5 of it.
@@ -245,14 +238,12 @@ def test_of_cycles_that_are_all_alike_the_last_is_left_to_be_compared(
     np.testing.assert_allclose(residuals, 1.0, atol=0.5)  # noise alone
 
 
-def test_a_log_shorter_than_a_cycle_has_no_free_one(pushed: Callable[..., Run]) -> None:
+def test_a_log_shorter_than_a_cycle_has_no_free_one(pushed):
     with pytest.raises(ReferenceTorqueError, match=r"no whole cycle of 13 s.*--free"):
         find_free_cycles(pushed(), Cycles(period=13.0, begin=0.0, end=12.0))
 
 
-def test_a_cycle_in_a_gap_is_not_free_and_the_others_are_judged(
-    pushed: Callable[..., Run],
-) -> None:
+def test_a_cycle_in_a_gap_is_not_free_and_the_others_are_judged(pushed):
     with_gap = pushed(t=T + 40.0 * (T >= 6.0))
     found = find_free_cycles(with_gap, Cycles(period=4.0, begin=0.0, end=52.0))
     assert found.residuals is not None
@@ -260,7 +251,7 @@ def test_a_cycle_in_a_gap_is_not_free_and_the_others_are_judged(
     assert set(found.numbers) <= {0, 1, 11, 12}
 
 
-def test_of_many_free_cycles_eight_are_laid_under_the_others_from_the_first_to_the_last() -> None:
+def test_of_many_free_cycles_eight_are_laid_under_the_others_from_the_first_to_the_last():
     many = FreeCycles(tuple(range(3, 62)), None)
     assert many.drawn == (3, 11, 20, 28, 36, 44, 53, 61)  # 58/7 cycles apart, rounded
     given, remark = many.remarks(64)
@@ -279,9 +270,7 @@ def test_of_many_free_cycles_eight_are_laid_under_the_others_from_the_first_to_t
 
 
 @pytest.mark.parametrize("free", [0, 1, 2])
-def test_a_cycle_is_laid_under_all_others_and_not_under_itself(
-    pushed: Callable[..., Run], free: int
-) -> None:
+def test_a_cycle_is_laid_under_all_others_and_not_under_itself(pushed, free):
     # By 4.1 s an instant 2 to 2.05 s from the middle of a cycle has no partner in it.
     for period in (4.0, 4.1):
         pairing = pair_with_cycle(pushed(), CYCLES, free, period)
@@ -295,7 +284,7 @@ def test_a_cycle_is_laid_under_all_others_and_not_under_itself(
         assert np.all((partners >= first) & (partners <= last))
 
 
-def test_an_instant_behind_the_last_cycle_or_before_the_first_is_in_none() -> None:
+def test_an_instant_behind_the_last_cycle_or_before_the_first_is_in_none():
     cycles = CYCLES._replace(begin=1.0, end=11.0)
     number = cycles.number(np.array([0.99, 1.0, 4.99, 5.0, 10.99, 11.01]))
     assert number.tolist() == [-1, 0, 0, 1, 2, -1]

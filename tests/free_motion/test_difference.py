@@ -39,7 +39,7 @@ def drive(drive_of: Make) -> Make:
     return lambda torque, model: drive_of(T, q, dq, drive_torque=torque, model_torque=model)
 
 
-def test_a_difference_is_free_less_loaded_with_the_model_s_own_taken_off(drive: Make) -> None:
+def test_a_difference_is_free_less_loaded_with_the_model_s_own_taken_off(drive):
     """τ + τ_ext is what the model says of each motion: the push comes out exactly."""
     loaded, free = drive(MODEL - PUSH, MODEL), drive(FREE_MODEL, FREE_MODEL)
     laid = PairedRuns(motion=loaded, pairings=[pair_with_run(T, free, 0.0)])
@@ -50,14 +50,14 @@ def test_a_difference_is_free_less_loaded_with_the_model_s_own_taken_off(drive: 
     assert np.all(corrected.error.floor < plain.error.floor)
 
 
-def test_too_few_partners_are_refused(drive: Make) -> None:
+def test_too_few_partners_are_refused(drive):
     loaded = drive(MODEL, MODEL)
     laid = PairedRuns(motion=loaded, pairings=[pair_with_run(T, loaded, T[-1] - T[14])])
     with pytest.raises(ReferenceTorqueError, match="only 15 samples have a partner"):
         difference(laid, "period", None)
 
 
-def test_the_simpler_of_two_alike_is_taken() -> None:
+def test_the_simpler_of_two_alike_is_taken():
     def made(rung: str, *floor: float, stands: bool = False) -> Difference:
         """A difference of two joints' floors, of which the second may stand."""
         standing = np.zeros((4, 2), dtype=bool) | [False, stands]
@@ -82,7 +82,7 @@ TIMES = STEP * np.arange(6000)
 MOVING = np.ones((6000, 1), dtype=bool)
 
 
-def test_white_noise_is_measured_under_a_smooth_signal_and_where_it_is_quiet() -> None:
+def test_white_noise_is_measured_under_a_smooth_signal_and_where_it_is_quiet():
     x = 0.3 * np.random.default_rng(1).standard_normal((6000, 1))
     smooth = x + 10.0 * np.sin(2 * np.pi * 0.5 * TIMES)[:, None]
     # 6000 samples tell 1 %
@@ -92,14 +92,14 @@ def test_white_noise_is_measured_under_a_smooth_signal_and_where_it_is_quiet() -
 
 
 @pytest.mark.parametrize("cutoff", [6.0, 12.0])
-def test_what_a_low_pass_leaves_of_white_noise(cutoff: float) -> None:
+def test_what_a_low_pass_leaves_of_white_noise(cutoff):
     """Measured beside the signal, predicted for the band that passes."""
     x = np.random.default_rng(2).standard_normal((6000, 1))
     left = float(np.sqrt(np.mean(low_pass(TIMES, x, cutoff) ** 2)))
     assert noise_of(TIMES, x, MOVING, STEP, cutoff) == pytest.approx(left, rel=0.1)
 
 
-def test_noise_is_measured_beside_the_cutoff() -> None:
+def test_noise_is_measured_beside_the_cutoff():
     """Above contacts, at least .2 of the rate, up to .45; pink, so that each band differs."""
     x = np.cumsum(np.random.default_rng(3).standard_normal((6000, 1)), axis=0)
     faster = (0.008, 6.0, 8.4, 15.6), (0.008, 20.0, 14.0, 26.0)
@@ -120,7 +120,7 @@ def coloured(memory: float, seed: int) -> np.ndarray:
 
 
 @pytest.mark.parametrize(("memory", "share"), [(0.03, 0.8), (0.1, 0.55)])
-def test_coloured_noise_is_measured_where_it_is_quiet(memory: float, share: float) -> None:
+def test_coloured_noise_is_measured_where_it_is_quiet(memory, share):
     """Beside a slow load and short contacts. What is slower than a piece counts for nothing: of an
     exponential correlation a line over .4 s leaves 86 % of the variance at .03 s, 45 % at .1 s."""
     load = 10.0 * np.sin(2 * np.pi * 0.1 * TIMES)[:, None]
@@ -135,7 +135,7 @@ def test_coloured_noise_is_measured_where_it_is_quiet(memory: float, share: floa
     assert noise_of(TIMES, x, MOVING, STEP, 12.0)[0] < quiet
 
 
-def test_what_a_differentiated_noise_leaves() -> None:
+def test_what_a_differentiated_noise_leaves():
     p = np.random.default_rng(3).standard_normal((6000, 1))
     slope = np.gradient(low_pass(TIMES, p, 8.0), TIMES, axis=0)
     shown = float(np.sqrt(np.mean(slope[50:-50] ** 2)))
@@ -143,7 +143,7 @@ def test_what_a_differentiated_noise_leaves() -> None:
     assert found == pytest.approx(shown, rel=0.1)
 
 
-def test_the_noise_of_momenta_is_no_motion(drive_of: Callable[..., Run]) -> None:
+def test_the_noise_of_momenta_is_no_motion(drive_of):
     """The model's torque of a run that differs by 5 sin πt N·m, and by the slope of its noise.
 
     Local squares of the noise scatter about their mean, so that half of it is left at most.
@@ -160,7 +160,7 @@ def test_the_noise_of_momenta_is_no_motion(drive_of: Callable[..., Run]) -> None
         assert least <= np.mean(found.sd**2) < most
 
 
-def test_the_floor_is_over_all_samples_and_the_floor_in_motion_over_those_that_move() -> None:
+def test_the_floor_is_over_all_samples_and_the_floor_in_motion_over_those_that_move():
     sd = np.column_stack([np.full(10, 1.0), np.repeat([1.0, 3.0], 5)])
     standing = np.zeros((10, 2), dtype=bool)
     standing[5:, 1] = True
@@ -181,7 +181,7 @@ def test_the_floor_is_over_all_samples_and_the_floor_in_motion_over_those_that_m
 CLOCK = 0.008 * np.arange(600)
 
 
-def test_the_differences_are_those_of_the_mean_over_the_free_runs(drive_of) -> None:
+def test_the_differences_are_those_of_the_mean_over_the_free_runs(drive_of):
     rng = np.random.default_rng(7)
 
     def run():
@@ -212,7 +212,7 @@ def test_the_differences_are_those_of_the_mean_over_the_free_runs(drive_of) -> N
     np.testing.assert_array_equal(pair.stopped, np.maximum(share, pair.standing))
 
 
-def test_a_model_that_is_right_misses_nothing(drive_of) -> None:
+def test_a_model_that_is_right_misses_nothing(drive_of):
     q = np.sin(CLOCK)[:, None]
     run = drive_of(CLOCK, q, np.cos(CLOCK)[:, None], drive_torque=5.0 * q, model_torque=5.0 * q)
     assert PairedRuns(motion=run, pairings=[pair_with_run(CLOCK, run, 0.0)]).misfit == 0.0
@@ -222,9 +222,7 @@ def test_a_model_that_is_right_misses_nothing(drive_of) -> None:
 
 
 @pytest.mark.parametrize(("late", "moved"), [(0.05, 0.05), (-0.05, -0.05), (0.3, 0.1)])
-def test_phase_finds_the_place_up_to_a_tenth_of_a_second_away(
-    drive_of, late: float, moved: float
-) -> None:
+def test_phase_finds_the_place_up_to_a_tenth_of_a_second_away(drive_of, late, moved):
     """On a circle at constant speed the log is `late` behind the free run of the same clock."""
 
     def run(t):
@@ -237,7 +235,7 @@ def test_phase_finds_the_place_up_to_a_tenth_of_a_second_away(
     np.testing.assert_allclose(times[middle], CLOCK[middle] - moved, atol=1e-4)
 
 
-def test_a_run_is_laid_by_shift_and_rate_as_far_as_it_goes(drive_of) -> None:
+def test_a_run_is_laid_by_shift_and_rate_as_far_as_it_goes(drive_of):
     pairing = pair_with_run(
         CLOCK, drive_of(CLOCK, np.column_stack([CLOCK]), np.ones((600, 1))), 1.0, 1.1
     )
@@ -246,7 +244,7 @@ def test_a_run_is_laid_by_shift_and_rate_as_far_as_it_goes(drive_of) -> None:
     np.testing.assert_allclose(pairing.times[known], 1.1 * CLOCK[known] + 1.0)
 
 
-def test_no_partner_is_made_up_in_a_gap(drive_of) -> None:
+def test_no_partner_is_made_up_in_a_gap(drive_of):
     """Six steps without a sample are a gap, five are interpolated across."""
     keep = np.ones(len(CLOCK), bool)
     keep[101:106] = keep[301:305] = False
@@ -256,7 +254,7 @@ def test_no_partner_is_made_up_in_a_gap(drive_of) -> None:
     assert np.flatnonzero(~pairing.known).tolist() == [*range(100, 106), 599]
 
 
-def test_phase_follows_slow_motion_by_steps_whichever_way_the_joint_turns(drive_of) -> None:
+def test_phase_follows_slow_motion_by_steps_whichever_way_the_joint_turns(drive_of):
     """A joint turns back at 1 rad/s, then at 0.05 rad/s, 30 ms behind the clock's word.
 
     Each of the four steps leaves d/(v² + d) of the shift, d being a hundredth of the mean v².

@@ -49,7 +49,7 @@ def codes(remarks: Sequence[object]) -> list[str]:
     return [getattr(remark, "code", "") for remark in remarks]
 
 
-def test_the_cycle_that_is_named_is_the_one_taken(circle: Run) -> None:
+def test_the_cycle_that_is_named_is_the_one_taken(circle):
     """``--set two-cycle.free-cycles=2`` is the second cycle, from 4 to 8 s, and no other."""
     motion = motion_of(circle, choice=FreeChoice(cycles=(2,)))
     clocks, _ = partners_in_log(motion)
@@ -64,13 +64,13 @@ def test_the_cycle_that_is_named_is_the_one_taken(circle: Run) -> None:
 
 
 @pytest.mark.parametrize("cycle", [0, 6])
-def test_cycles_that_are_not_there(circle: Run, cycle: int) -> None:
+def test_cycles_that_are_not_there(circle, cycle):
     assert motion_of(circle, choice=FreeChoice(cycles=(1, 5))).cycles_given == (0, 4)
     with pytest.raises(ReferenceTorqueError, match=f"no cycle {cycle}; the log holds 5 whole"):
         _ = motion_of(circle, choice=FreeChoice(cycles=(1, cycle))).cycles_given
 
 
-def test_an_arm_that_only_yields_has_no_free_cycle_but_those_named(circle: Run) -> None:
+def test_an_arm_that_only_yields_has_no_free_cycle_but_those_named(circle):
     """The same motion, .09 rad of it: pushes on an arm that holds still move it as much."""
     log = circle.recording
     q = log.q[0] + (log.q - log.q[0]) * 0.09 / np.ptp(log.q, axis=0).max()
@@ -80,7 +80,7 @@ def test_an_arm_that_only_yields_has_no_free_cycle_but_those_named(circle: Run) 
     assert FreeMotion(log=run, choice=FreeChoice(cycles=(1,))).known.own.any()
 
 
-def test_a_cycle_inside_a_free_span_is_free(circle: Run) -> None:
+def test_a_cycle_inside_a_free_span_is_free(circle):
     motion = motion_of(circle, choice=FreeChoice(spans=((3.9, 8.1), (19.0, np.inf))))
     assert motion.free_cycles.numbers == (1,)
     own = circle.recording.t[motion.part.own]
@@ -94,19 +94,19 @@ def test_a_cycle_inside_a_free_span_is_free(circle: Run) -> None:
     assert (first.values["begin_s"], first.values["end_s"]) == (3.0, 7.0)
 
 
-def test_a_span_without_a_whole_cycle_leaves_the_cycles_to_be_found(circle: Run) -> None:
+def test_a_span_without_a_whole_cycle_leaves_the_cycles_to_be_found(circle):
     motion = motion_of(circle, choice=FreeChoice(spans=((0.5, 2.0),)))
     assert motion.free_cycles.numbers == (0,)  # as found: the first is the free one
 
 
-def test_spans_and_cycles_add_up(circle: Run) -> None:
+def test_spans_and_cycles_add_up(circle):
     motion = motion_of(circle, choice=FreeChoice(spans=((0.0, 4.05),), cycles=(3,)))
     assert motion.free_cycles.numbers == (0, 2)
     own = circle.recording.t[motion.part.own]
     assert not np.any((own > 4.1) & (own < 7.9))
 
 
-def test_spans_that_carry_nothing_are_free_where_nothing_else_is_given(circle: Run) -> None:
+def test_spans_that_carry_nothing_are_free_where_nothing_else_is_given(circle):
     motion, given = (motion_of(circle, choice=FreeChoice(cycles=c)) for c in ((), (2,)))
     assert motion.unloaded(((0.0, 4.0),)).choice.spans == ((0.0, 4.0),)
     assert motion.unloaded(()) is motion
@@ -114,14 +114,12 @@ def test_spans_that_carry_nothing_are_free_where_nothing_else_is_given(circle: R
 
 
 @pytest.mark.parametrize("spans", [((40.0, 50.0),), ((-1.0, 30.0),)])
-def test_a_span_that_is_no_part_of_the_log_is_refused(
-    circle: Run, spans: tuple[tuple[float, float], ...]
-) -> None:
+def test_a_span_that_is_no_part_of_the_log_is_refused(circle, spans):
     with pytest.raises(ParameterError, match="it must be a part of the log"):
         _ = motion_of(circle, choice=FreeChoice(spans=spans)).part
 
 
-def test_each_run_is_a_piece(part_of: Make, circle: Run) -> None:
+def test_each_run_is_a_piece(part_of, circle):
     log = Run(recording=part_of(circle.recording, 8.0, 14.0), robot=ROBOT)
     same, more = part_of(circle.recording, 0.0, 4.0), part_of(circle.recording, 4.0, 8.0)
     other = replace(same, q=same.q[:, ::-1] + 0.5, source=replace(same.source, t0=99.0))
@@ -142,9 +140,7 @@ def test_each_run_is_a_piece(part_of: Make, circle: Run) -> None:
 
 
 @pytest.mark.parametrize("rate", [1.004, 1.00005])
-def test_shift_rate_and_covered_time_of_a_free_run(
-    part_of: Make, circle: Run, rate: float
-) -> None:
+def test_shift_rate_and_covered_time_of_a_free_run(part_of, circle, rate):
     """The log's first 4 of 6 s again, on a clock 2 s later; of six joints the fifth rests 10 mrad
     away."""
     log = part_of(circle.recording, 4.0, 10.0)
@@ -163,7 +159,7 @@ def test_shift_rate_and_covered_time_of_a_free_run(
     assert dict(remark.values) == values | deviation | other
 
 
-def test_the_log_itself_is_no_free_run(circle: Run) -> None:
+def test_the_log_itself_is_no_free_run(circle):
     run = FreeRun(run=Run(recording=circle.recording, robot=ROBOT), log=circle)
     with pytest.raises(ParameterError, match="given as the log or as --free, are one run"):
         FreeMotion(log=circle, runs=(run,))
@@ -192,7 +188,7 @@ def baseline(log: Recording) -> Baseline:
     return baseline_of(FreeMotion(log=run, choice=FreeChoice(cycles=(1,))))
 
 
-def test_a_payload_is_weighed_and_reported(log: Recording) -> None:
+def test_a_payload_is_weighed_and_reported(log):
     """Friction the profile misses is 10 % of its own here: some 1 N·m, .2 kg at the elbow.
 
     The drives' constants are known to a share of what they read: mass and moment alike.
@@ -208,7 +204,7 @@ def test_a_payload_is_weighed_and_reported(log: Recording) -> None:
     assert str(remark)
 
 
-def test_an_arm_carries_the_inertia_of_a_load_too(log: Recording) -> None:
+def test_an_arm_carries_the_inertia_of_a_load_too(log):
     """As with the same load mounted; or every start and stop would look like a push."""
     load = FreeLoad(mass=3.0, moment=PAYLOAD[1:], sd=0.1, moment_sd=np.ones(3), share=0.5)
     body = Payload(mass=3.0, com=PAYLOAD[1:] / 3.0, inertia=np.zeros((3, 3)))
@@ -221,7 +217,7 @@ def test_an_arm_carries_the_inertia_of_a_load_too(log: Recording) -> None:
     assert without_load(bare, None) is bare
 
 
-def test_its_wrench_is_what_its_torque_comes_from(log: Recording) -> None:
+def test_its_wrench_is_what_its_torque_comes_from(log):
     """τ = Jᵀw; of 2.8 ± .1 kg each axis of the force is known to .1 kg of weight."""
     load = FreeLoad(
         mass=2.8, moment=PAYLOAD[1:], sd=0.1, moment_sd=np.array([0.01, 0.02, 0.03]), share=0.5
@@ -236,7 +232,7 @@ def test_its_wrench_is_what_its_torque_comes_from(log: Recording) -> None:
     assert np.all(sd[:, 3:5] <= 9.81 * 0.03 * np.sqrt(2.0))
 
 
-def test_no_load_is_found_where_there_is_none(log: Recording) -> None:
+def test_no_load_is_found_where_there_is_none(log):
     """In a simulation without noise or torque no joint has anything left over to divide by."""
     assert baseline(log).load is None
     assert free_load(()) is None
@@ -248,7 +244,7 @@ def test_no_load_is_found_where_there_is_none(log: Recording) -> None:
     assert free_load((RunSamples(run, log.t > 1.0),)) is None
 
 
-def test_a_payload_is_torque_and_no_noise(log: Recording) -> None:
+def test_a_payload_is_torque_and_no_noise(log):
     """Gains and free error stay those of the unloaded arm, and the weight stays in the estimate."""
     plain, loaded = baseline(log), baseline(carrying(log))
     blind = replace(loaded, load=None)
@@ -278,9 +274,7 @@ def test_a_payload_is_torque_and_no_noise(log: Recording) -> None:
         (3.0, 1.0, 1.1, False),  # four such stretches of .3 s: 3 ± .9 kg
     ],
 )
-def test_a_load_is_believed_by_its_mass_its_sd_and_what_it_leaves(
-    mass: float, ratio: float, seconds: float, is_found: bool
-) -> None:
+def test_a_load_is_believed_by_its_mass_its_sd_and_what_it_leaves(mass, ratio, seconds, is_found):
     """A disturbance of 3.2 Hz beside the load's torque, `ratio` times as large on each joint."""
     t, k = 0.008 * np.arange(round(seconds / 0.008)), np.arange(6.0)
     phase = t[:, None] * (1.0 + 0.3 * k) + k
@@ -298,7 +292,7 @@ def test_a_load_is_believed_by_its_mass_its_sd_and_what_it_leaves(
         assert found.share == pytest.approx(ratio / np.hypot(1.0, ratio), abs=0.05)
 
 
-def test_a_column_of_friction_has_the_direction_of_its_joint(log: Recording) -> None:
+def test_a_column_of_friction_has_the_direction_of_its_joint(log):
     at, _, A = columns(RunSamples(Run(recording=log, robot=ROBOT), (log.t > 8) & (log.t < 9)))
     dq, friction = log.dq[at], np.diagonal(A[:, :, 4:10], axis1=1, axis2=2)
     fast = abs(dq) > 0.1  # tanh(5) is 1 − 1e-4; the filter takes less than .02 rad/s
@@ -308,13 +302,13 @@ def test_a_column_of_friction_has_the_direction_of_its_joint(log: Recording) -> 
 # What a user may choose of free motion: parsed and checked once, alike in every command
 
 
-def test_a_span_of_free_is_the_free_part_and_a_log_may_hold_a_colon() -> None:
+def test_a_span_of_free_is_the_free_part_and_a_log_may_hold_a_colon():
     choice = FreeChoice.parsed(free=["2:4", "run.csv", ":1", "./2:4", "C:/run.csv"])
     assert choice.spans == ((2.0, 4.0), (-np.inf, 1.0))
     assert choice.logs == tuple(map(Path, ("run.csv", "./2:4", "C:/run.csv")))
 
 
-def test_what_counts_as_given() -> None:
+def test_what_counts_as_given():
     assert not FreeChoice().is_given
     assert not FreeChoice(period=4.0).is_given
     assert FreeChoice(period=4.0).period == 4.0
@@ -334,14 +328,12 @@ def test_what_counts_as_given() -> None:
         ({"two-cycle.low-pass": "all"}, "not a positive cutoff"),
     ],
 )
-def test_choices_that_exclude_each_other_or_do_not_exist(
-    options: dict[str, object], message: str
-) -> None:
+def test_choices_that_exclude_each_other_or_do_not_exist(options, message):
     with pytest.raises(ReferenceTorqueError, match=message):
         FreeChoice.parsed(**options)
 
 
-def test_lists_of_cycles_cutoffs_and_names_of_rungs() -> None:
+def test_lists_of_cycles_cutoffs_and_names_of_rungs():
     assert cycle_numbers("1") == (1,)
     assert cycle_numbers("1, 3-5,3") == (1, 3, 4, 5)
     for text in ("first", "", "0", "3-2", "1-999999999", "9" * 5000):

@@ -64,7 +64,7 @@ def error_of(reference: ExternalTorque, truth: Array) -> Array:
     return np.asarray(np.sqrt(np.nanmean((reference.tau - truth) ** 2, axis=0)))
 
 
-def test_default_beats_the_commanded_period(circle, ur5: Robot) -> None:
+def test_default_beats_the_commanded_period(circle, ur5):
     """Required: at most 0.6 times its error, mean over J1–J4 and J6."""
     best = two_cycle_difference(circle.recording, (), ur5)
     plain = FreeChoice(period=4.0, alignment="commanded", low_pass=None)
@@ -75,9 +75,7 @@ def test_default_beats_the_commanded_period(circle, ur5: Robot) -> None:
 
 @pytest.mark.parametrize("low_pass", [None, 12.0, 6.0])
 @pytest.mark.parametrize("rung", RUNGS)
-def test_every_rung_knows_its_error(
-    circle, ur5: Robot, rung: str, low_pass: float | None
-) -> None:
+def test_every_rung_knows_its_error(circle, ur5, rung, low_pass):
     choice = FreeChoice(period=4.0, alignment=rung, low_pass=low_pass)
     reference = two_cycle_difference(circle.recording, (), ur5, choice)
     assert reference.floor is not None
@@ -87,7 +85,7 @@ def test_every_rung_knows_its_error(
     assert np.all((ratio >= least) & (ratio <= HONEST[1])), ratio
 
 
-def test_free_cycle_and_joint_at_rest_are_reported(circle, ur5: Robot) -> None:
+def test_free_cycle_and_joint_at_rest_are_reported(circle, ur5):
     reference = two_cycle_difference(circle.recording, (), ur5)
     t = circle.recording.t
     assert np.isnan(reference.tau[t < 3.99]).all()  # the free cycle has no reference of its own
@@ -104,7 +102,7 @@ def test_free_cycle_and_joint_at_rest_are_reported(circle, ur5: Robot) -> None:
     assert remarks["alignment-chosen"].values["rung"].endswith(" Hz low-pass")
 
 
-def test_two_free_cycles_measure_the_floor(circle, ur5: Robot) -> None:
+def test_two_free_cycles_measure_the_floor(circle, ur5):
     """Given cycles 2 and 3, both pushed, the measured floor must say how wrong that is."""
     choice = FreeChoice(cycles=(2, 3))
     pushed = two_cycle_difference(circle.recording, (), ur5, choice)
@@ -115,7 +113,7 @@ def test_two_free_cycles_measure_the_floor(circle, ur5: Robot) -> None:
     assert "floor-measured" in {r.code for r in pushed.remarks if isinstance(r, Remark)}
 
 
-def test_missing_samples(circle, ur5: Robot) -> None:
+def test_missing_samples(circle, ur5):
     """Five per cent lost at random and a gap of 0.2 s: still honest, and the gap is left out."""
     log = circle.recording
     keep = np.random.default_rng(2).random(log.samples) > 0.05
@@ -130,7 +128,7 @@ def test_missing_samples(circle, ur5: Robot) -> None:
     assert np.isnan(reference.tau[hole]).all()
 
 
-def test_options_that_do_not_go_with_the_logs(circle, ur5: Robot) -> None:
+def test_options_that_do_not_go_with_the_logs(circle, ur5):
     with pytest.raises(ReferenceTorqueError, match=r"between 0 and 62\.5 Hz"):
         two_cycle_difference(circle.recording, (), ur5, FreeChoice(low_pass=80.0))
     source = replace(circle.recording.source, path=Path("other.csv"), t0=1.0)  # another run
@@ -141,9 +139,7 @@ def test_options_that_do_not_go_with_the_logs(circle, ur5: Robot) -> None:
 
 @pytest.mark.parametrize("pair", ["ab", "ac", "ba", "bc", "ca", "cb"])
 @pytest.mark.parametrize("low_pass", [None, "auto"])
-def test_floor_covers_real_free_pairs(
-    repeats: dict[str, Recording], pair: str, low_pass: str | None
-) -> None:
+def test_floor_covers_real_free_pairs(repeats, pair, low_pass):
     """The same free motion twice: what the difference shows on moving samples is its error."""
     robot = load_robot("ur10e")
     choice = FreeChoice(low_pass=low_pass)
@@ -173,14 +169,14 @@ def shares_of_error(reference: ExternalTorque) -> tuple[np.ndarray, np.ndarray]:
     return found[0], found[1]
 
 
-def test_three_free_runs_measure_the_floor(repeats: dict[str, Recording]) -> None:
+def test_three_free_runs_measure_the_floor(repeats):
     free = [repeats["b"], repeats["c"]]
     reference = two_cycle_difference(repeats["a"], free, load_robot("ur10e"))
     moving, _ = shares_of_error(reference)
     assert np.all((moving >= HONEST[0]) & (moving <= HONEST[1])), moving
 
 
-def test_a_payload_is_seen(logs: Path) -> None:
+def test_a_payload_is_seen(logs):
     """Documented: the difference correlates 0.986 (J2) and 0.977 (J3) with the load's gravity."""
     import pinocchio as pin
 
@@ -207,7 +203,7 @@ def test_a_payload_is_seen(logs: Path) -> None:
     assert mass == pytest.approx(2.805, rel=0.1)
 
 
-def test_at_a_low_rate_the_low_pass_is_two_fifths_of_nyquist(circle, ur5: Robot) -> None:
+def test_at_a_low_rate_the_low_pass_is_two_fifths_of_nyquist(circle, ur5):
     """Every fourth of 125 samples a second: .4 · 15.625 Hz."""
     log = circle.recording
     thin = Recording(t=log.t[::4], q=log.q[::4], dq=log.dq[::4], current=log.current[::4])
@@ -217,7 +213,7 @@ def test_at_a_low_rate_the_low_pass_is_two_fifths_of_nyquist(circle, ur5: Robot)
     assert floors[1].values["rung"].endswith(" + 6.25 Hz low-pass")
 
 
-def test_the_error_s_remarks_and_its_measured_ratio() -> None:
+def test_the_error_s_remarks_and_its_measured_ratio():
     """Of 100 samples joint 1 rests in 52, joint 2 in 51, joint 3 in 3, joint 4 in 2."""
     sd, rests = np.ones((100, 4)), np.arange(100)[:, None] < [52, 51, 3, 2]
     sd[:2] = np.nan  # without a partner: 50, 49, 1 and none of the other 98 at rest
@@ -246,7 +242,7 @@ def swing(drive_of: Callable[..., Run]) -> Run:
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_a_change_is_found(swing: Run, seed: int) -> None:
+def test_a_change_is_found(swing, seed):
     """0.4 N·m of friction under 0.3 N·m of noise: 2500 samples tell it to 0.006 N·m."""
     motion, rng = swing, np.random.default_rng(seed)
     tau = 0.4 * np.sign(motion.dq) * [1.0, 0.0] + 0.3 * rng.standard_normal(motion.dq.shape)
@@ -258,7 +254,7 @@ def test_a_change_is_found(swing: Run, seed: int) -> None:
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_pushes_are_not_taken_for_it(swing: Run, seed: int) -> None:
+def test_pushes_are_not_taken_for_it(swing, seed):
     """Pushes of 10 N·m, a second each, at random times and either way."""
     motion, rng = swing, np.random.default_rng(seed)
     tau = 0.3 * rng.standard_normal(motion.dq.shape)
@@ -301,7 +297,7 @@ def errors_of(run: Simulation, choice: FreeChoice) -> tuple[Array, Array]:
 
 @pytest.mark.statistical
 @pytest.mark.parametrize(("name", "seed"), RUNS)
-def test_required_figures(name: str, seed: int) -> None:
+def test_required_figures(name, seed):
     run = simulate(load_scenario("ur5-circle", [*SETTINGS[name], STICKS]), seed)
     wanted = 4.0 * (1.003 if name == "drift" else 1.0)
     assert find_period(run.recording).seconds == pytest.approx(wanted, rel=2e-4)

@@ -3,7 +3,6 @@
 import os
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -51,7 +50,7 @@ def gain(choice: ObserverChoice) -> float:
     return float(choice.build(UR5, STEP)[0][0].gain[0])
 
 
-def test_nothing_said_runs_the_best_and_the_paper_s_four() -> None:
+def test_nothing_said_runs_the_best_and_the_paper_s_four():
     assert ObserverChoice.parsed() == ObserverChoice()
     assert [o.name for o in ObserverChoice().build(UR5, STEP)[0]] == list(DEFAULT)
     assert (DEFAULT[0], DEFAULT[1:]) == (BEST, PAPER)
@@ -70,17 +69,17 @@ def test_nothing_said_runs_the_best_and_the_paper_s_four() -> None:
         ({"observer": ["rts-auto", "kfo-auto", "kfo-rts", "fdo"], "causal": True}, ("fdo",)),
     ],
 )
-def test_who_runs(words: dict[str, Any], names: tuple[str, ...]) -> None:
+def test_who_runs(words, names):
     assert ObserverChoice.parsed(**words).names == names
 
 
-def test_beside_a_print_stand_its_own_observers_unless_others_are_named() -> None:
+def test_beside_a_print_stand_its_own_observers_unless_others_are_named():
     assert ObserverChoice().beside_print().names == PAPER
     named = ObserverChoice(names=("best", "gmo"))
     assert named.beside_print() is named
 
 
-def test_gains_of_the_log_go_between_the_robot_and_set(spectra: Spectra) -> None:
+def test_gains_of_the_log_go_between_the_robot_and_set(spectra):
     gains = {"gmo": {"gain": 7.0}, "kfo": {"r_diag": 2.0}}
     shown = LogSpectra(plain=spectra, best=spectra, gains=gains)
     asked = ObserverChoice.parsed(gains="auto", observer=["gmo", "kfo-zoh"])
@@ -98,7 +97,7 @@ def test_gains_of_the_log_go_between_the_robot_and_set(spectra: Spectra) -> None
     assert [remark.code for remark in remarks] == ["gains-without-free-part"]
 
 
-def test_the_best_is_tuned_to_what_is_left_without_the_bias(spectra: Spectra) -> None:
+def test_the_best_is_tuned_to_what_is_left_without_the_bias(spectra):
     """Each observer that the log tunes sees the spectra of the terms that it runs on."""
     quiet = replace(spectra, free=0.01 * spectra.free)
     shown = LogSpectra(plain=spectra, best=quiet)
@@ -113,7 +112,7 @@ def test_the_best_is_tuned_to_what_is_left_without_the_bias(spectra: Spectra) ->
     assert [(r.code, r.where.about) for r in remarks] == [("tuning-without-free-part", "best")]
 
 
-def test_set_goes_before_a_file_and_a_file_before_the_robot(tmp_path: Path) -> None:
+def test_set_goes_before_a_file_and_a_file_before_the_robot(tmp_path):
     file = tmp_path / "gains.toml"
     file.write_text("[observers.gmo]\ngain = 21.0\n", encoding="utf-8")
     own = ObserverChoice.parsed(observer=["gmo"], gains="paper")
@@ -129,7 +128,7 @@ def test_set_goes_before_a_file_and_a_file_before_the_robot(tmp_path: Path) -> N
     assert gain(matched) == pytest.approx(20.0, rel=1e-9)
 
 
-def test_only_observers_that_a_log_tunes_need_its_spectra() -> None:
+def test_only_observers_that_a_log_tunes_need_its_spectra():
     assert not ObserverChoice(causal=True).from_spectra
     assert ObserverChoice(causal=True, gains="auto").from_spectra
     assert ObserverChoice().from_spectra
@@ -146,7 +145,7 @@ def test_only_observers_that_a_log_tunes_need_its_spectra() -> None:
         ({"observer": ["best", "best"], "causal": True}, "leaves out best, which needs"),
     ],
 )
-def test_a_slip_is_refused_before_a_log_is_read(words: dict[str, object], message: str) -> None:
+def test_a_slip_is_refused_before_a_log_is_read(words, message):
     with pytest.raises(ParameterError, match=message):
         ObserverChoice.parsed(**words)
 
@@ -195,7 +194,7 @@ def setup(robot: str, *assignments: str, joints: int = 6, step: float = 0.008) -
     return Setup(gains=gains, settings=settings, joints=joints, step=step, as_printed=False)
 
 
-def test_the_profile_gives_the_papers_gains() -> None:
+def test_the_profile_gives_the_papers_gains():
     (fdo, gmo, fe, _), remarks = build_observers(PAPER, setup("ur5"))
     assert fdo.omega == 10.0
     np.testing.assert_array_equal(gmo.gain, [5, 3, 4, 10, 10, 10])
@@ -203,7 +202,7 @@ def test_the_profile_gives_the_papers_gains() -> None:
     assert remarks == ()
 
 
-def test_the_command_line_wins_over_the_profile() -> None:
+def test_the_command_line_wins_over_the_profile():
     (gmo, zoh), _ = build_observers(
         ["gmo", "kfo-zoh"],
         setup("ur5", "gmo.gain=30", "kfo.r_diag=1,2,3,4,5,6", "kfo-zoh.decay=2"),
@@ -213,7 +212,7 @@ def test_the_command_line_wins_over_the_profile() -> None:
     np.testing.assert_array_equal(zoh.decay, [2.0] * 6)
 
 
-def test_gains_nobody_gave_take_the_kalman_filters_delay_and_say_so() -> None:
+def test_gains_nobody_gave_take_the_kalman_filters_delay_and_say_so():
     (fdo, gmo, fe), remarks = build_observers(
         ["fdo", "gmo", "kfo-fe"],
         setup("panda", "kfo.noise_convention=density", joints=7, step=0.001),
@@ -226,7 +225,7 @@ def test_gains_nobody_gave_take_the_kalman_filters_delay_and_say_so() -> None:
 
 
 @pytest.mark.parametrize("name", ["kfo-fe", "kfo-zoh", "kfo-rts"])
-def test_a_file_s_noise_is_a_sample_s_and_a_bare_robot_s_a_density(name: str) -> None:
+def test_a_file_s_noise_is_a_sample_s_and_a_bare_robot_s_a_density(name):
     """ω_n of R .5 and Q_τ 5000 at 125 Hz: (Q_τ/R)^¼ of densities, (Q_τ/(R·Ts))^¼ of samples."""
     expected = {"ur5": (5000 / 0.5 / 0.008) ** 0.25, "": 10.0}
     for robot, omega in expected.items():
@@ -240,12 +239,12 @@ def test_a_file_s_noise_is_a_sample_s_and_a_bare_robot_s_a_density(name: str) ->
     assert named.tuning(0.008, 6).omega_n[0] == pytest.approx(10.0, rel=1e-12)
 
 
-def test_the_print_runs_its_own_convention_and_says_so() -> None:
+def test_the_print_runs_its_own_convention_and_says_so():
     (fe,), _ = build_observers(["kfo-fe"], setup("ur5")._replace(as_printed=True))
     assert fe.noise_convention == "literal"
 
 
-def test_what_a_log_would_tune_and_first_order_gains_keep_to_densities() -> None:
+def test_what_a_log_would_tune_and_first_order_gains_keep_to_densities():
     """Delay of the Panda's density reading at 1 kHz: 41.8 and 24.7 ms, not 7.1 and 4.1 ms."""
     panda = setup("panda", joints=7, step=0.001)
     names = ["best", "kfo-auto", "rts-auto", "fdo", "gmo"]
@@ -261,7 +260,7 @@ def test_what_a_log_would_tune_and_first_order_gains_keep_to_densities() -> None
     assert 1.0 / fdo.omega == pytest.approx(delay.mean(), abs=5e-5)
 
 
-def test_a_bare_robot_gets_ten_per_second_and_is_reported() -> None:
+def test_a_bare_robot_gets_ten_per_second_and_is_reported():
     (gmo,), remarks = build_observers(["gmo"], setup(""))
     np.testing.assert_array_equal(gmo.gain, [10.0] * 6)
     assert [remark.code for remark in remarks] == ["gain-from-default"]
@@ -281,7 +280,7 @@ def test_a_bare_robot_gets_ten_per_second_and_is_reported() -> None:
         ("gmo.gain=1,2,3", r"gmo\.gain has 3 values; give one, or one for each of 6"),
     ],
 )
-def test_a_malformed_assignment_says_what_is_wrong(assignment: str, words: str) -> None:
+def test_a_malformed_assignment_says_what_is_wrong(assignment, words):
     with pytest.raises(ParameterError, match=words):
         build_observers(["gmo"], setup("ur5", assignment))
 
@@ -304,14 +303,14 @@ def test_a_malformed_assignment_says_what_is_wrong(assignment: str, words: str) 
         (f"x = {'[' * 5000}", "gains.toml: not valid TOML: nested too deep"),
     ],
 )
-def test_what_is_no_gains_file_is_refused(tmp_path: Path, text: str, words: str) -> None:
+def test_what_is_no_gains_file_is_refused(tmp_path, text, words):
     path = tmp_path / "gains.toml"
     path.write_text(text)
     with pytest.raises(VftError, match=words):
         load_gains(path)
 
 
-def test_a_robot_file_s_gains_are_checked_like_a_gains_file_s(tmp_path: Path) -> None:
+def test_a_robot_file_s_gains_are_checked_like_a_gains_file_s(tmp_path):
     text = PROFILES["ur5"].read_text(encoding="utf-8")
     path = tmp_path / "arm.toml"
     path.write_text(text.replace("[observers.gmo]", "[observers.gmoo]"), encoding="utf-8")
@@ -319,7 +318,7 @@ def test_a_robot_file_s_gains_are_checked_like_a_gains_file_s(tmp_path: Path) ->
         ObserverChoice().build(load_robot(path), 0.008)
 
 
-def test_the_upper_layer_wins_parameter_by_parameter() -> None:
+def test_the_upper_layer_wins_parameter_by_parameter():
     under = {"kfo": {"r_diag": 1.0, "q_p_diag": 2.0}, "fdo": {"omega": 3.0}}
     over = {"kfo": {"r_diag": 9.0}, "gmo": {"gain": 4.0}}
     assert overlay_gains(under, over) == {
@@ -330,12 +329,12 @@ def test_the_upper_layer_wins_parameter_by_parameter() -> None:
     assert under["kfo"]["r_diag"] == 1.0  # the robot's own is left alone
 
 
-def test_a_word_that_is_no_file_of_gains_says_which_words_there_are(tmp_path: Path) -> None:
+def test_a_word_that_is_no_file_of_gains_says_which_words_there_are(tmp_path):
     with pytest.raises(ParameterError, match="--gains takes auto, paper, or a file"):
         load_gains(tmp_path / "papper")
 
 
-def test_gains_come_from_a_pipe_too() -> None:
+def test_gains_come_from_a_pipe_too():
     read, write = os.pipe()
     os.write(write, b"[observers.gmo]\ngain = 12.0\n")
     os.close(write)

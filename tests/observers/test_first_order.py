@@ -1,13 +1,10 @@
 """FDO and GMO: analytic answers, their identity, uneven clocks, and the printed forms."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from made_terms import random_walk, run_in_blocks
 
 from vftcli.observers import FilteredDynamicsObserver, MomentumObserver
-from vftcli.observers.observer import Observer
 from vftcli.observers.table import Setup, build_observers
 from vftcli.readers.reading import read
 from vftcli.robots import load_robot
@@ -34,7 +31,7 @@ def with_gaps(pieces: int, samples: int = 50) -> DynamicsTerms:
     "observer", [FilteredDynamicsObserver(omega=7.0), MomentumObserver(gain=7.0)]
 )
 @pytest.mark.parametrize("jitter", [0.0, 0.3])
-def test_agrees_with_the_formula_written_as_a_loop(observer: Observer, jitter: float) -> None:
+def test_agrees_with_the_formula_written_as_a_loop(observer, jitter):
     terms = random_walk(700, jitter, joints=2)
     r, k = np.zeros_like(terms.p), 7.0
     for i in range(1, terms.samples):
@@ -47,7 +44,7 @@ def test_agrees_with_the_formula_written_as_a_loop(observer: Observer, jitter: f
     np.testing.assert_allclose(observer.estimate(terms).tau, r, atol=1e-11)  # rounding of ωp
 
 
-def test_a_long_gap_restarts_the_filter_and_says_so() -> None:
+def test_a_long_gap_restarts_the_filter_and_says_so():
     """Two gaps of .17 s, a = 1.3 there."""
     for observer in (MomentumObserver(gain=15.0), FilteredDynamicsObserver(omega=15.0)):
         estimate = observer.estimate(with_gaps(3, samples=230))
@@ -60,7 +57,7 @@ def test_a_long_gap_restarts_the_filter_and_says_so() -> None:
 
 
 @pytest.mark.parametrize(("kappa", "restarts"), [(1.5, True), (1.99, True), (2.5, False)])
-def test_gains_that_already_alternate_restart_nothing(kappa: float, restarts: bool) -> None:
+def test_gains_that_already_alternate_restart_nothing(kappa, restarts):
     """From K·Ts = 2 on the user's own gain makes a > 1 in every step: no gap is to blame."""
     estimate = MomentumObserver(gain=kappa * RATE).estimate(with_gaps(2))
     assert [r.code for r in estimate.remarks] == ["restarted-after-gaps"] * restarts
@@ -68,7 +65,7 @@ def test_gains_that_already_alternate_restart_nothing(kappa: float, restarts: bo
 
 
 @pytest.mark.parametrize("episode", [0, 1])
-def test_a_slow_clock_that_jitters_has_no_gaps(episode: int, samples: Path) -> None:
+def test_a_slow_clock_that_jitters_has_no_gaps(episode, samples):
     """DROID's 15 Hz: a = .88 to .98 at the median step, steps of 61 to 72 ms, none missed."""
     pytest.importorskip("h5py", reason="h5py, the extra hdf5, is not installed")
     pl = pytest.importorskip("polars")
@@ -85,7 +82,7 @@ def test_a_slow_clock_that_jitters_has_no_gaps(episode: int, samples: Path) -> N
     assert np.sqrt(np.mean((estimate.tau[:, 5] - truth) ** 2)) <= 0.17
 
 
-def test_as_printed_fdo_leaks_momentum() -> None:
+def test_as_printed_fdo_leaks_momentum():
     """The printed k₃ leaves ωa/(1+2a)·p of a constant momentum, the corrected one nothing."""
     t = clock(2000)
     terms = DynamicsTerms(t=t, p=np.full((2000, 1), 2.4), mu=np.zeros((2000, 1)))
@@ -97,7 +94,7 @@ def test_as_printed_fdo_leaks_momentum() -> None:
 
 
 @pytest.mark.parametrize(("kappa", "stable"), [(0.3, True), (1.9, True), (2.1, False)])
-def test_as_printed_gmo_is_unstable_from_two_on(kappa: float, stable: bool) -> None:
+def test_as_printed_gmo_is_unstable_from_two_on(kappa, stable):
     """z² − (1−κ/2)z + κ/2 = 0 has its roots on the unit circle at κ = 2."""
     terms = random_walk(2000, joints=1)
     printed = MomentumObserver(gain=kappa * RATE, as_printed=True).estimate(terms)
@@ -106,7 +103,7 @@ def test_as_printed_gmo_is_unstable_from_two_on(kappa: float, stable: bool) -> N
     assert bool(printed.remarks) != stable
 
 
-def test_as_printed_gmo_agrees_with_its_formula_as_a_loop() -> None:
+def test_as_printed_gmo_agrees_with_its_formula_as_a_loop():
     terms = random_walk(400, joints=2)
     printed = MomentumObserver(gain=10.0, as_printed=True).estimate(terms).tau
     r = np.zeros((401, 2))
@@ -118,7 +115,7 @@ def test_as_printed_gmo_agrees_with_its_formula_as_a_loop() -> None:
 
 
 @pytest.mark.parametrize("gain", [0.0, -1.0, np.nan, np.inf])
-def test_a_gain_that_is_not_positive_is_refused(gain: float) -> None:
+def test_a_gain_that_is_not_positive_is_refused(gain):
     with pytest.raises(ParameterError, match="must be positive"):
         MomentumObserver(gain=gain)
     with pytest.raises(ParameterError, match="must be positive"):
@@ -128,9 +125,7 @@ def test_a_gain_that_is_not_positive_is_refused(gain: float) -> None:
 @pytest.mark.parametrize("as_printed", [False, True])
 @pytest.mark.parametrize("jitter", [0.0, 0.3])
 @pytest.mark.parametrize("observer", [FilteredDynamicsObserver, MomentumObserver])
-def test_blocks_of_a_log_give_the_whole_log_s_estimate(
-    observer: type, jitter: float, as_printed: bool
-) -> None:
+def test_blocks_of_a_log_give_the_whole_log_s_estimate(observer, jitter, as_printed):
     log, fdo = random_walk(PIECE + 900, jitter, joints=2), observer(as_printed=as_printed)
     whole = fdo.estimate(log).tau
     np.testing.assert_array_equal(run_in_blocks(fdo, log, PIECE)[0], whole)
@@ -144,14 +139,14 @@ def test_blocks_of_a_log_give_the_whole_log_s_estimate(
         np.testing.assert_allclose(found, whole[short], rtol=0, atol=1e-11)
 
 
-def test_gaps_are_counted_over_all_blocks() -> None:
+def test_gaps_are_counted_over_all_blocks():
     log, gmo = with_gaps(3), MomentumObserver(gain=10.0)
     (tau, remarks), whole = run_in_blocks(gmo, log, 25), gmo.estimate(log)
     assert remarks == whole.remarks
     np.testing.assert_allclose(tau, whole.tau, atol=1e-12)
 
 
-def test_the_filter_loses_three_decibels_at_its_bandwidth() -> None:
+def test_the_filter_loses_three_decibels_at_its_bandwidth():
     """The bilinear transform warps it: tan(π f Ts) = K·Ts/2; for short steps it is K/2π."""
     slow, fine = (MomentumObserver(gain=10.0).tuning(step, 2) for step in (0.008, 1e-6))
     np.testing.assert_allclose(np.tan(np.pi * slow.bandwidth * 0.008), 0.04, rtol=1e-12)

@@ -48,9 +48,7 @@ def paper(scheme: str, convention: str = "density", **more: object) -> KalmanObs
 @pytest.mark.parametrize("convention", NOISE_CONVENTIONS)
 @pytest.mark.parametrize("scheme", ["fe", "zoh"])
 @pytest.mark.parametrize("jitter", [0.0, 0.2])
-def test_agrees_with_the_dense_textbook_filter(
-    scheme: str, convention: str, jitter: float
-) -> None:
+def test_agrees_with_the_dense_textbook_filter(scheme, convention, jitter):
     observer, log = paper(scheme, convention), random_walk(jitter=jitter)
     tau, sd = dense_torque(dense_filter(observer, log))
     estimate = observer.estimate(log)
@@ -63,9 +61,7 @@ def test_agrees_with_the_dense_textbook_filter(
     ("scheme", "more"),
     [("fe", {"decay": 3.0}), ("zoh", {"decay": 3.0}), ("fe", {"as_printed": True})],
 )
-def test_decay_and_printed_euler_agree_with_the_dense_textbook_filter(
-    scheme: str, more: dict[str, Any]
-) -> None:
+def test_decay_and_printed_euler_agree_with_the_dense_textbook_filter(scheme, more):
     """The print is on μ alone, of the literal noise."""
     observer, log = paper(scheme, **more), random_walk(samples=600)
     tau, _ = dense_torque(dense_filter(observer, log))
@@ -96,7 +92,7 @@ def printed_loop(log: DynamicsTerms, joint: int, decay: float) -> tuple[np.ndarr
 
 @pytest.mark.parametrize("decay", [0.0, 2.0])
 @pytest.mark.parametrize("jitter", [0.0, 0.2])
-def test_as_printed_hold_runs_the_printed_block(jitter: float, decay: float) -> None:
+def test_as_printed_hold_runs_the_printed_block(jitter, decay):
     log = random_walk(samples=300, jitter=jitter)
     found = paper("zoh", as_printed=True, decay=decay).estimate(log)
     for joint in (0, 3):
@@ -106,12 +102,12 @@ def test_as_printed_hold_runs_the_printed_block(jitter: float, decay: float) -> 
         np.testing.assert_allclose(found.sd[:, joint], sd, rtol=1e-9)
 
 
-def test_as_printed_hold_goes_on_where_a_block_ends() -> None:
+def test_as_printed_hold_goes_on_where_a_block_ends():
     observer, log = paper("zoh", as_printed=True), random_walk(samples=300, jitter=0.2)
     np.testing.assert_array_equal(run_in_blocks(observer, log, 37)[0], observer.estimate(log).tau)
 
 
-def test_as_printed_hold_is_faster_than_the_corrected_one_by_a_quarter_of_a_sample() -> None:
+def test_as_printed_hold_is_faster_than_the_corrected_one_by_a_quarter_of_a_sample():
     """Its unsymmetric part (Q_τ + Q_p)Ts²/2 pulls: 137.506 → 135.506 ms on J1, to first order."""
     corrected, printed = (
         paper("zoh", as_printed=as_printed).tuning(STEP, 6) for as_printed in (False, True)
@@ -122,7 +118,7 @@ def test_as_printed_hold_is_faster_than_the_corrected_one_by_a_quarter_of_a_samp
 
 @pytest.mark.parametrize("decay", [0.0, 1e-3, 0.5, 1.0, 10.0, 50.0])
 @pytest.mark.parametrize("step", [0.001, 0.008, 0.1])
-def test_hold_is_van_loans_matrix_exponential(decay: float, step: float) -> None:
+def test_hold_is_van_loans_matrix_exponential(decay, step):
     """(43) and (44) with the lower-right block −A_cᵀ, by SciPy's expm."""
     one = Densities(*(np.array([v]) for v in (0.5, 0.01, 5000.0, decay)))
     model = zero_order_hold(np.array(step), one)
@@ -138,7 +134,7 @@ def test_hold_is_van_loans_matrix_exponential(decay: float, step: float) -> None
     np.testing.assert_allclose(found, Q[[0, 0, 1], [0, 1, 1]], rtol=1e-9, atol=1e-13 * 5000)
 
 
-def test_the_printed_44_is_unsymmetric_indefinite_and_a_quarter_sample_faster() -> None:
+def test_the_printed_44_is_unsymmetric_indefinite_and_a_quarter_sample_faster():
     """docs/paper.md: lower-right block −A_c, run all the same. 1e-6 s: the iteration's rest."""
     A_c, Q_c = np.array([[0.0, 1.0], [0.0, 0.0]]), np.diag([0.01, 5000.0])
     A = np.eye(2) + STEP * A_c
@@ -161,7 +157,7 @@ def test_the_printed_44_is_unsymmetric_indefinite_and_a_quarter_sample_faster() 
 @pytest.mark.parametrize("convention", NOISE_CONVENTIONS)
 @pytest.mark.parametrize("scheme", ["fe", "zoh"])
 @pytest.mark.parametrize("step", [0.001, 0.008])
-def test_closed_form_gains_are_scipys_riccati(scheme: str, convention: str, step: float) -> None:
+def test_closed_form_gains_are_scipys_riccati(scheme, convention, step):
     observer = paper(scheme, convention)
     settled, m = observer.steady(step, 6), observer.model(step, 6)
     prior = observer.first_prior(step, 6)
@@ -184,9 +180,7 @@ def test_closed_form_gains_are_scipys_riccati(scheme: str, convention: str, step
         ("literal", (2.99, 2.36), (468.9, 596.5)),
     ],
 )
-def test_what_the_papers_parameters_mean(
-    convention: str, omega: tuple[float, float], delay: tuple[float, float]
-) -> None:
+def test_what_the_papers_parameters_mean(convention, omega, delay):
     tuning = paper("fe", convention).tuning(STEP, 6)
     # the table's last printed digit
     np.testing.assert_allclose(tuning.omega_n[[0, 3]], omega, atol=0.005)
@@ -194,7 +188,7 @@ def test_what_the_papers_parameters_mean(
 
 
 @pytest.mark.parametrize(("decay", "gain"), [(1.0, 0.872), (10.0, 0.278)])
-def test_a_decaying_model_loses_gain_at_rest(decay: float, gain: float) -> None:
+def test_a_decaying_model_loses_gain_at_rest(decay, gain):
     """DC gain of kfo-zoh with A_τ = −a, UR5 J1, as worked out and as the filter really answers."""
     observer = paper("zoh", decay=decay)
     t = np.arange(6000) * STEP
@@ -205,7 +199,7 @@ def test_a_decaying_model_loses_gain_at_rest(decay: float, gain: float) -> None:
     assert tuning.dc_gain[0] == pytest.approx(gain, abs=1e-3)  # printed digits
 
 
-def test_forward_euler_refuses_a_decay_it_cannot_hold() -> None:
+def test_forward_euler_refuses_a_decay_it_cannot_hold():
     with pytest.raises(ParameterError, match=r"unstable: decay·Ts = 2\.4"):
         paper("fe", decay=300.0).estimate(random_walk(samples=50))
 
@@ -214,13 +208,13 @@ def test_forward_euler_refuses_a_decay_it_cannot_hold() -> None:
     ("field", "value"),
     [("r_diag", 0.0), ("q_tau_diag", -1.0), ("q_p_diag", -0.1), ("decay", np.nan)],
 )
-def test_impossible_variances_are_refused(field: str, value: float) -> None:
+def test_impossible_variances_are_refused(field, value):
     with pytest.raises(ParameterError, match=f"kfo.{field}"):
         KalmanObserver(**{field: value})
 
 
 @pytest.mark.parametrize("scheme", ["fe", "zoh"])
-def test_half_the_power_passes_at_the_bandwidth(scheme: str) -> None:
+def test_half_the_power_passes_at_the_bandwidth(scheme):
     """The continuous filter is ω²/(s² + 2ζωs + ω²): solved for |H|² = ½ where it is tuned."""
     tuning = paper(scheme).tuning(STEP, 6)
     s, omega = 2j * np.pi * tuning.bandwidth, tuning.omega_n
@@ -230,7 +224,7 @@ def test_half_the_power_passes_at_the_bandwidth(scheme: str) -> None:
 
 @pytest.mark.parametrize("as_printed", [False, True])
 @pytest.mark.parametrize("jitter", [0.0, 0.2])
-def test_blocks_of_a_log_give_the_whole_log_s_estimate(jitter: float, as_printed: bool) -> None:
+def test_blocks_of_a_log_give_the_whole_log_s_estimate(jitter, as_printed):
     # (44) as printed has no pieces.
     scheme = "fe" if as_printed else "zoh"
     observer, log = paper(scheme, as_printed=as_printed), random_walk(PIECE + 900, jitter)
@@ -307,7 +301,7 @@ SETTINGS = {
 
 @pytest.mark.parametrize("scheme", ["fe", "zoh"])
 @pytest.mark.parametrize("setting", SETTINGS)
-def test_gains_are_those_of_the_plain_loop(setting: str, scheme: str) -> None:
+def test_gains_are_those_of_the_plain_loop(setting, scheme):
     more, dt, first = SETTINGS[setting]
     observer = KalmanObserver(discretisation=scheme, **more)
     settled = observer.steady(0.008, 2)
@@ -329,7 +323,7 @@ def test_gains_are_those_of_the_plain_loop(setting: str, scheme: str) -> None:
 @pytest.mark.parametrize("q_tau", [1e-3, 5e3, 5e7])
 @pytest.mark.parametrize("scheme", ["fe", "zoh"])
 @pytest.mark.parametrize("samples", [1, 2, 50, 1000])
-def test_the_filter_is_the_plain_loop(samples: int, scheme: str, q_tau: float) -> None:
+def test_the_filter_is_the_plain_loop(samples, scheme, q_tau):
     dt, rng = steps(5)[:samples], np.random.default_rng(7)
     p = np.cumsum(rng.normal(0.0, 0.1, (samples, 2)), axis=0)
     log = DynamicsTerms(t=np.cumsum(dt), p=p, mu=rng.normal(0.0, 5.0, (samples, 2)))

@@ -37,9 +37,7 @@ def dense_rts(steps: list[Any]) -> tuple[np.ndarray, np.ndarray]:
 @pytest.mark.parametrize("convention", ["density", "discrete", "literal"])
 @pytest.mark.parametrize("scheme", ["fe", "zoh"])
 @pytest.mark.parametrize("jitter", [0.0, 0.3])
-def test_agrees_with_a_dense_textbook_smoother(
-    scheme: str, convention: str, jitter: float
-) -> None:
+def test_agrees_with_a_dense_textbook_smoother(scheme, convention, jitter):
     log = random_walk(700, jitter, joints=2)
     smooth = smoother(scheme, convention)
     # The first state may be anything: `WIDE` is its variance.
@@ -55,9 +53,7 @@ def test_agrees_with_a_dense_textbook_smoother(
 
 @pytest.mark.parametrize("scheme", ["fe", "zoh"])
 @pytest.mark.parametrize("jitter", [0.0, 0.3])
-def test_a_constant_torque_is_known_from_the_first_sample_to_the_last(
-    scheme: str, jitter: float
-) -> None:
+def test_a_constant_torque_is_known_from_the_first_sample_to_the_last(scheme, jitter):
     """Whatever was there before the log: 3 and 50 N·m at sample 0, none of it wandered."""
     rng = np.random.default_rng(4)
     t = STEP * (np.arange(1000) + jitter * rng.uniform(-0.5, 0.5, 1000))
@@ -72,7 +68,7 @@ def test_a_constant_torque_is_known_from_the_first_sample_to_the_last(
     assert np.all(np.abs(estimate.tau[0] - truth) < 1.96 * estimate.sd[0])
 
 
-def test_frequency_response_is_that_of_the_two_sided_filter() -> None:
+def test_frequency_response_is_that_of_the_two_sided_filter():
     samples, f = 8000, 1.5
     t = np.arange(samples) * 0.001
     w = 2 * np.pi * f
@@ -87,14 +83,14 @@ def test_frequency_response_is_that_of_the_two_sided_filter() -> None:
     np.testing.assert_allclose(cosine, 0.0, atol=1e-4)
 
 
-def test_the_bandwidth_is_that_of_the_formula() -> None:
+def test_the_bandwidth_is_that_of_the_formula():
     tuning = smoother().tuning(STEP, 2)
     # −3 dB of |H_KFO|² at .802 ω_n for ζ = .707
     np.testing.assert_allclose(2 * np.pi * tuning.bandwidth / tuning.omega_n, 0.802, atol=1e-3)
     assert not np.any(tuning.delay)
 
 
-def test_a_gap_of_days_parts_a_log_into_two() -> None:
+def test_a_gap_of_days_parts_a_log_into_two():
     """Nothing is known across it: each part is what a log of its own gives, but near the gap."""
     rng = np.random.default_rng(3)
     t = STEP * np.arange(2000)
@@ -110,7 +106,7 @@ def test_a_gap_of_days_parts_a_log_into_two() -> None:
 
 @pytest.mark.parametrize("samples", [0, 1, 2])
 @pytest.mark.parametrize("scheme", ["fe", "zoh"])
-def test_a_part_of_a_log_may_be_a_sample_or_none(samples: int, scheme: str) -> None:
+def test_a_part_of_a_log_may_be_a_sample_or_none(samples, scheme):
     """As between two gaps, or of an episode without rows; one sample alone shows no torque."""
     p = np.arange(samples * 2.0).reshape(samples, 2)
     log = DynamicsTerms(t=STEP * np.arange(samples), p=p, mu=np.zeros_like(p))

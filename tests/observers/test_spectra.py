@@ -26,7 +26,7 @@ from vftcli.signals.external_torque import DynamicsTerms
 STEP = 0.008
 
 
-def test_spectra_hold_the_mean_square_and_the_mean() -> None:
+def test_spectra_hold_the_mean_square_and_the_mean():
     """Parseval: the density summed over frequency is the power, a constant's included."""
     t = STEP * np.arange(4000)
     torque = 2.0 + np.random.default_rng(5).normal(0.0, 0.5, (4000, 2))
@@ -39,7 +39,7 @@ def test_spectra_hold_the_mean_square_and_the_mean() -> None:
     np.testing.assert_allclose(power, np.mean(d**2, axis=0), rtol=0.03)
 
 
-def test_white_noise_has_a_flat_spectrum_of_the_known_height() -> None:
+def test_white_noise_has_a_flat_spectrum_of_the_known_height():
     """One-sided density of white d with variance s² is 2s²Ts."""
     rng = np.random.default_rng(7)
     t = STEP * np.arange(40_000)
@@ -54,14 +54,14 @@ def test_white_noise_has_a_flat_spectrum_of_the_known_height() -> None:
     assert found.external.sum() < 0.1 * found.loaded.sum()
 
 
-def test_a_part_too_short_for_a_spectrum_is_refused() -> None:
+def test_a_part_too_short_for_a_spectrum_is_refused():
     terms = momentum_of(STEP * np.arange(100), np.zeros((100, 1)))
     few = np.arange(100) < 20
     with pytest.raises(ParameterError, match="needs 32 samples in a row; the loaded part has 99"):
         spectra_of(samples_of(terms, ~few), [samples_of(terms, few)])
 
 
-def test_no_segment_reaches_across_a_gap() -> None:
+def test_no_segment_reaches_across_a_gap():
     t = np.concatenate([STEP * np.arange(60), 10.0 + STEP * np.arange(25)])
     t += np.random.default_rng(0).uniform(0, 1e-4, len(t))
     terms = momentum_of(t, np.ones((85, 1)))
@@ -92,9 +92,7 @@ def flat_spectra(free: float = 1.0, loaded: float = 3.0) -> Spectra:
         (0.6 + 0.8j, 0.8, 1.0),
     ],
 )
-def test_power_goes_with_the_square_of_the_complex_response(
-    response: complex, missed: float, passed: float
-) -> None:
+def test_power_goes_with_the_square_of_the_complex_response(response, missed, passed):
     """|1 − H|² of S_τ = 2 and |H|² of S_n = 1 over 5.5 Hz; a delay turns H without changing |H|."""
     spectra, H = flat_spectra(), np.full((11, 1), response, complex)
     assert spectra.missed(H)[0] == pytest.approx(11.0 * missed)
@@ -110,7 +108,7 @@ def chattering() -> Spectra:
     return Spectra(frequency=f[:, 0], free=free, loaded=free + 2.0, step=0.01, segments=(1, 1))
 
 
-def test_above_five_hertz_an_external_torque_s_spectrum_falls() -> None:
+def test_above_five_hertz_an_external_torque_s_spectrum_falls():
     """c = 2 · mean of f^2.5 over the twenty bins from .25 to 5 Hz; up to there nothing changes."""
     spectra, f = chattering(), np.linspace(0.0, 50.0, 201)
     np.testing.assert_allclose(spectra.external[f <= 5.0], 2.0)
@@ -126,7 +124,7 @@ def test_above_five_hertz_an_external_torque_s_spectrum_falls() -> None:
     assert spectra.passed(one)[0] == pytest.approx(0.25 * spectra.noise.sum())
 
 
-def test_a_spectrum_that_falls_by_itself_is_left_as_it_is() -> None:
+def test_a_spectrum_that_falls_by_itself_is_left_as_it_is():
     """1/f³ lies below c/f^2.5 everywhere above 5 Hz, as c is a mean over slower frequencies."""
     f = np.linspace(0.0, 50.0, 201)
     torque = (1.0 / np.maximum(f, 0.25) ** 3)[:, None]
@@ -136,7 +134,7 @@ def test_a_spectrum_that_falls_by_itself_is_left_as_it_is() -> None:
     np.testing.assert_allclose(spectra.noise, free)
 
 
-def test_neighbours_are_averaged_over_a_fifth_of_the_frequency() -> None:
+def test_neighbours_are_averaged_over_a_fifth_of_the_frequency():
     spectrum = np.arange(50.0)[:, None]
     # a straight line stays
     np.testing.assert_allclose(neighbour_mean(spectrum)[:40], spectrum[:40])
@@ -148,7 +146,7 @@ def test_neighbours_are_averaged_over_a_fifth_of_the_frequency() -> None:
     assert np.flatnonzero(found).tolist() == list(range(17, 26))
 
 
-def test_the_floor_is_the_quietest_octave_s_level_below_it() -> None:
+def test_the_floor_is_the_quietest_octave_s_level_below_it():
     """The seventh half octave above the first bin, 5.66 to 11.3 Hz, is the only quiet one."""
     f = np.arange(101) * 0.5
     free = np.where((f >= 5.5) & (f <= 11.5), 1.0, 100.0)[:, None]
@@ -158,7 +156,7 @@ def test_the_floor_is_the_quietest_octave_s_level_below_it() -> None:
     np.testing.assert_allclose(spectra.floor[f >= 15.0], 100.0)
 
 
-def test_a_part_of_impacts_alone_has_the_spectrum_of_the_impacts() -> None:
+def test_a_part_of_impacts_alone_has_the_spectrum_of_the_impacts():
     """Taps of .1 s, 20 N·m: their power over their own time is what S_τ adds up to.
 
     White noise of .1 N·m is nothing beside it; windows that overlap the taps unevenly move it by
@@ -186,12 +184,12 @@ def spectra(contact: float) -> Spectra:
 
 
 @pytest.mark.parametrize(("contact", "free"), [(2.0, True), (3.0, True), (7.0, False)])
-def test_contacts_are_reported_below_five_hertz(contact: float, free: bool) -> None:
+def test_contacts_are_reported_below_five_hertz(contact, free):
     """Above, drives ripple louder in some cycles than in others: that says nothing of contact."""
     assert looks_free(spectra(contact)) is free
 
 
-def test_most_joints_decide() -> None:
+def test_most_joints_decide():
     one = spectra(2.0)
     quiet = one.loaded.copy()
     quiet[:, 0] = one.free[:, 0]
@@ -206,7 +204,7 @@ def test_most_joints_decide() -> None:
 FRICTION = np.array([4.0, 0.0])
 
 
-def test_rest_and_motion_are_learned_apart() -> None:
+def test_rest_and_motion_are_learned_apart():
     """Columns of 1 N·m at rest and 3 N·m in motion; the dry friction of J1 is the larger."""
     resting = np.zeros((200, 2), dtype=bool)
     resting[:100] = True
@@ -217,7 +215,7 @@ def test_rest_and_motion_are_learned_apart() -> None:
     assert not found.unseen.any()
 
 
-def test_few_samples_are_spoken_for_by_all() -> None:
+def test_few_samples_are_spoken_for_by_all():
     """With 49 moving samples of 200 the mean square is over all of them, friction beside it."""
     resting = np.ones((200, 2), dtype=bool)
     resting[: ENOUGH - 1, 0] = False
@@ -228,7 +226,7 @@ def test_few_samples_are_spoken_for_by_all() -> None:
     np.testing.assert_array_equal(found.unseen, [True, True])
 
 
-def test_variances_add_sample_by_sample() -> None:
+def test_variances_add_sample_by_sample():
     free = FreeError(np.array([4.0, 1.0]), np.array([9.0, 2.0]), np.zeros(2, dtype=bool))
     resting = np.array([[True, False], [False, True], [False, False]])
     correction = np.array([[1.0, 0.0], [0.0, 2.0], [3.0, 3.0]])

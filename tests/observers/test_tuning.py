@@ -49,7 +49,7 @@ def spectra(noise: float = 1e-3) -> Spectra:
     return Spectra(frequency=f, free=quiet, loaded=quiet + torque, step=STEP, segments=(4, 10))
 
 
-def test_every_observer_reaches_the_stated_delay_or_bandwidth() -> None:
+def test_every_observer_reaches_the_stated_delay_or_bandwidth():
     for line in tune_all(spectra(), parse_goal("delay=0.05")):
         expected = 0.0 if line.observer == "kfo-rts" else 0.05
         np.testing.assert_allclose(line.delay, expected, atol=1e-9)
@@ -60,7 +60,7 @@ def test_every_observer_reaches_the_stated_delay_or_bandwidth() -> None:
     np.testing.assert_allclose(lines["fdo"].rate, lines["gmo"].rate)
 
 
-def test_few_false_alarms_cost_bandwidth() -> None:
+def test_few_false_alarms_cost_bandwidth():
     many = tune_all(spectra(0.3), parse_goal("false-alarms=1000", "8"))
     few = tune_all(spectra(0.3), parse_goal("false-alarms=0.01", "8"))
     for fast, slow in zip(many, few, strict=True):
@@ -82,12 +82,12 @@ def test_few_false_alarms_cost_bandwidth() -> None:
         ("false-alarms=2", "a"),
     ],
 )
-def test_goals_that_are_none(goal: str, threshold: str | None) -> None:
+def test_goals_that_are_none(goal, threshold):
     with pytest.raises(ParameterError, match=r"--gains|alarm\.threshold"):
         parse_goal(goal, threshold)
 
 
-def test_a_tuned_file_goes_into_a_comparison(tmp_path: Path) -> None:
+def test_a_tuned_file_goes_into_a_comparison(tmp_path):
     """identify writes it, --gains takes it: GMO then errs as little as was promised."""
     gains, runner = tmp_path / "gains.toml", CliRunner()
     asked = ["identify", str(FIXTURE), "--robot", "ur5", "--method", "gains", "--json"]
@@ -113,7 +113,7 @@ def test_a_tuned_file_goes_into_a_comparison(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("offset", [0.0, 0.5, -0.5])
-def test_a_constant_error_brings_one_threshold_nearer(offset: float) -> None:
+def test_a_constant_error_brings_one_threshold_nearer(offset):
     """2 Hz of σ = 1.5 N·m about an offset m: 7200·(e^{−(h−m)²/2σ²} + e^{−(h+m)²/2σ²}) an hour."""
     f = np.linspace(0.0, 10.0, 1001)
     power = np.where(np.isclose(f, 2.0), 2.25, 0.0)[:, None]
@@ -126,7 +126,7 @@ def test_a_constant_error_brings_one_threshold_nearer(offset: float) -> None:
     assert crossings(power, np.array([0.0, 2.0]), np.array([2.0]))[0] == np.inf
 
 
-def test_the_one_rate_of_filtered_dynamics_lies_between_those_of_the_joints() -> None:
+def test_the_one_rate_of_filtered_dynamics_lies_between_those_of_the_joints():
     """It has the smallest mean error; each joint by itself could have less."""
     fdo, gmo, *_ = tune_all(spectra(0.3), parse_goal("auto"))
     assert fdo.gains["omega"] == fdo.rate[0] == fdo.rate[1]
@@ -134,7 +134,7 @@ def test_the_one_rate_of_filtered_dynamics_lies_between_those_of_the_joints() ->
     assert np.all(gmo.rmse < fdo.rmse)
 
 
-def test_a_threshold_is_one_or_one_a_joint() -> None:
+def test_a_threshold_is_one_or_one_a_joint():
     with pytest.raises(
         ParameterError, match=r"alarm.threshold has 3 values; .* each of 2 joints"
     ):
@@ -143,7 +143,7 @@ def test_a_threshold_is_one_or_one_a_joint() -> None:
         assert line.alarms is not None
 
 
-def test_a_gain_at_a_bound_is_said_with_the_numbers() -> None:
+def test_a_gain_at_a_bound_is_said_with_the_numbers():
     """No torque beyond the noise: every observer runs to the slowest; a stated delay has none."""
     quiet, goal = spectra(), parse_goal("auto")
     silent = replace(quiet, loaded=quiet.free)
@@ -180,7 +180,7 @@ def pushed(
 
 
 @pytest.mark.parametrize("name", KINDS)
-def test_the_expected_error_is_the_measured_one(name: str) -> None:
+def test_the_expected_error_is_the_measured_one(name):
     """The spectra predict the rmse that the tuned observer then has against the truth."""
     loaded, free = pushed()
     observer = tune_to_spectra(name, spectra_of(loaded, [free]))
@@ -195,7 +195,7 @@ def test_the_expected_error_is_the_measured_one(name: str) -> None:
     np.testing.assert_allclose(rmse, observer.curve.least, rtol=0.2)
 
 
-def test_tuning_finds_the_best_of_all_natural_frequencies() -> None:
+def test_tuning_finds_the_best_of_all_natural_frequencies():
     loaded, free = pushed()
     spectra = spectra_of(loaded, [free])
     found = error_curve(kalman_filter, spectra)
@@ -209,7 +209,7 @@ def test_tuning_finds_the_best_of_all_natural_frequencies() -> None:
         assert np.all(expected(found.best * factor) >= found.least)
 
 
-def test_the_noise_level_gives_innovations_their_expected_variance() -> None:
+def test_the_noise_level_gives_innovations_their_expected_variance():
     """NIS = 1 on the loaded part, which is what R is scaled for."""
     loaded, free = pushed()
     spectra = spectra_of(loaded, [free])
@@ -223,7 +223,7 @@ def test_the_noise_level_gives_innovations_their_expected_variance() -> None:
     np.testing.assert_allclose(nis, 1.0, rtol=0.1)
 
 
-def test_without_spectra_auto_falls_back_and_says_so() -> None:
+def test_without_spectra_auto_falls_back_and_says_so():
     setup = Setup(gains={}, settings={}, joints=2, step=STEP, as_printed=False)
     observers, remarks = build_observers(("kfo-auto", "rts-auto", "kfo-zoh", "kfo-rts"), setup)
     untuned = [r for r in remarks if r.code == "tuning-without-free-part"]
@@ -236,7 +236,7 @@ def test_without_spectra_auto_falls_back_and_says_so() -> None:
     np.testing.assert_array_equal(smoothed.tau, rts.tau)
 
 
-def test_tuned_observers_have_nothing_left_to_tune() -> None:
+def test_tuned_observers_have_nothing_left_to_tune():
     setup = Setup(gains={}, settings={}, joints=2, step=STEP, as_printed=False)
     setup = setup._replace(shown=LogSpectra(plain=spectra()))
     observer, remarks = OBSERVERS["rts-auto"].build(setup, "rts-auto")
@@ -256,7 +256,7 @@ def with_chatter(level: float) -> Spectra:
     )
 
 
-def test_chatter_under_load_does_not_run_the_gains_up() -> None:
+def test_chatter_under_load_does_not_run_the_gains_up():
     """Without the cap the smoother follows a chatter of ten times the noise up to its bound."""
     quiet, loud = (error_curve(kalman_smoother, with_chatter(level)) for level in (0.0, 0.1))
     # it is noise: the gains become slower, not faster
@@ -264,7 +264,7 @@ def test_chatter_under_load_does_not_run_the_gains_up() -> None:
     assert bound_remarks("rts-auto", loud.best, loud.omega_n) == ()
 
 
-def test_a_bound_is_never_reached_in_silence() -> None:
+def test_a_bound_is_never_reached_in_silence():
     grid = np.array([1.0, 10.0, 250.0])
     slow, fast = bound_remarks("kfo-auto", np.array([1.0, 10.0, 250.0, 1.0]), grid)
     assert (slow.code, fast.code) == ("gain-at-slowest", "gain-at-fastest")
@@ -274,7 +274,7 @@ def test_a_bound_is_never_reached_in_silence() -> None:
     assert str(fast).startswith("kfo-auto: J3: ")
 
 
-def test_best_keeps_a_push_where_the_log_shows_none() -> None:
+def test_best_keeps_a_push_where_the_log_shows_none():
     """Tuned on noise alone it keeps what 1/(1 + (ω/9)⁴) leaves of a half sine of .6 s."""
     _, free = pushed()
     t = free.run.terms.t
@@ -319,7 +319,7 @@ def tuned(goal: str, step: float = 0.008, convention: str | None = None) -> list
 @pytest.mark.parametrize("step", [0.001, 0.008])
 @pytest.mark.parametrize("convention", ["density", "discrete", "literal"])
 @pytest.mark.parametrize("delay", [0.02, 0.1, 0.5])
-def test_the_same_delay_on_every_joint(delay: float, convention: str, step: float) -> None:
+def test_the_same_delay_on_every_joint(delay, convention, step):
     for observer in tuned(f"delay={delay}", step, convention):
         found = observer.tuning(step, 3).delay
         assert found == pytest.approx(np.full(3, delay), rel=1e-9), observer.name
@@ -327,13 +327,13 @@ def test_the_same_delay_on_every_joint(delay: float, convention: str, step: floa
 
 @pytest.mark.parametrize("step", [0.001, 0.008])
 @pytest.mark.parametrize("hertz", [0.5, 5.0, 20.0])
-def test_the_same_bandwidth_on_every_joint(hertz: float, step: float) -> None:
+def test_the_same_bandwidth_on_every_joint(hertz, step):
     for observer in tuned(f"bandwidth={hertz}", step):
         gain = np.abs(observer.frequency_response(np.array([hertz]), step, 3))
         assert gain[0] == pytest.approx(np.full(3, np.sqrt(0.5)), rel=1e-9), observer.name
 
 
-def test_frequency_responses_are_those_of_the_filters() -> None:
+def test_frequency_responses_are_those_of_the_filters():
     """Amplitude and lag of the answer to a sine of 2 Hz, long after the transient."""
     t, w = 0.008 * np.arange(5000), 4 * np.pi
     p = -np.cos(w * t)[:, None] / w * np.ones(3)
@@ -345,7 +345,7 @@ def test_frequency_responses_are_those_of_the_filters() -> None:
         np.testing.assert_allclose(sine + 1j * cosine, response, atol=1e-9)
 
 
-def test_a_ramp_lags_by_the_matched_delay() -> None:
+def test_a_ramp_lags_by_the_matched_delay():
     """τ_ext = t: after the transient every estimate is t − delay."""
     t = np.arange(0.0, 6.0, 0.008)
     p = np.repeat(0.5 * t[:, None] ** 2, 3, axis=1)
@@ -370,12 +370,12 @@ NO_GOAL = r"delay=S \(seconds\) or bandwidth=HZ, a positive"
         ("bandwidth=200", "half the sample rate"),
     ],
 )
-def test_goals_that_are_none_or_out_of_reach(goal: str, message: str) -> None:
+def test_goals_that_are_none_or_out_of_reach(goal, message):
     with pytest.raises(ParameterError, match=message):
         tuned(goal)
 
 
-def test_one_joint_out_of_reach_is_refused() -> None:
+def test_one_joint_out_of_reach_is_refused():
     """Two joints could have the delay; on the third R = 1e12 and the largest Q_τ, 1e18, make
     ω_n = (Q_τ/R)^¼ = 32 rad/s and so √2/ω_n = 45 ms."""
     density = {"r_diag": [0.5, 0.5, 1e12], "noise_convention": "density"}
@@ -386,13 +386,13 @@ def test_one_joint_out_of_reach_is_refused() -> None:
         match_observers(observers, parse_goal("delay=0.02"), 0.008, 3)
 
 
-def test_printed_formulas_are_not_matched() -> None:
+def test_printed_formulas_are_not_matched():
     choice = ObserverChoice.parsed(gains="delay=0.05", as_printed=True)
     with pytest.raises(ParameterError, match="--as-printed"):
         choice.build(load_robot("ur5"), 0.008)
 
 
-def test_first_order_observers_are_called_alike_only_where_both_run() -> None:
+def test_first_order_observers_are_called_alike_only_where_both_run():
     observers, _ = build_observers(["fdo", "kfo-zoh"], setup())
     _, (remark,) = match_observers(observers, parse_goal("bandwidth=3"), 0.008, 3)
     assert (remark.code, remark.values) == ("bandwidth-matched", {"bandwidth_Hz": 3.0})
