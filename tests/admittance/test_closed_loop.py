@@ -223,6 +223,15 @@ def test_the_wrench_is_that_of_the_log(name, q):
     np.testing.assert_allclose(sensor.wrench(np.array(q)), logged.values[0], atol=1e-10)
 
 
+def test_a_mean_torque_enters_as_it_is_and_an_instant_by_the_trapezoid():
+    """A step of 50 N·m at the second sample: the trapezoid takes half of it."""
+    sensors = [OnlineKalman(KFO, load_robot("ur5"), 0.001, averaged=a) for a in (True, False)]
+    q, still = np.array([0.3, -1.2, 1.4, -1.7, -1.5, 0.2]), np.zeros(6)
+    for torque in (0.0, 50.0):
+        mean, instant = (each.sample(q, still, np.full(6, torque)) for each in sensors)
+    np.testing.assert_allclose(mean - instant, -0.001 * 25.0 * sensors[0].gains.l2, rtol=1e-9)
+
+
 def test_a_singular_pose_reads_no_force():
     sensor = OnlineKalman(KFO, load_robot("ur5"), 0.001, averaged=False)
     sensor.tau = np.ones(6)

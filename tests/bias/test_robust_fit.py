@@ -173,6 +173,7 @@ def weight(rows):
 @pytest.mark.parametrize("scale", [0.1, 1.0])
 def test_the_solution_is_that_of_the_dense_matrix(rows, weight, scale):
     """The group of loads is the one with the least objective and twice its columns."""
+    assert rows.loads.torque.shape[2] == 6 + 3  # elbow and wrist of four joints are one point
     found, P = rows.solution(rows.sums(weight)[0], scale), rows.unknowns
     expected = best_by_hand(dense(rows), rows.d, weight, scale, rows)
     assert P + len(found.loads) == len(expected)

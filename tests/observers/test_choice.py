@@ -18,14 +18,11 @@ from vftcli.observers import (
 from vftcli.observers.paper import MomentumObserver
 from vftcli.observers.spectra import Spectra
 from vftcli.observers.table import (
-    BEST,
-    DEFAULT,
     PAPER,
     LogSpectra,
     Setup,
     build_observers,
     load_gains,
-    overlay_gains,
     parse_settings,
 )
 from vftcli.robots import PROFILES, load_robot
@@ -50,15 +47,10 @@ def gain(choice: ObserverChoice) -> float:
     return float(choice.build(UR5, STEP)[0][0].gain[0])
 
 
-def test_nothing_said_runs_the_best_and_the_paper_s_four():
-    assert ObserverChoice.parsed() == ObserverChoice()
-    assert [o.name for o in ObserverChoice().build(UR5, STEP)[0]] == list(DEFAULT)
-    assert (DEFAULT[0], DEFAULT[1:]) == (BEST, PAPER)
-
-
 @pytest.mark.parametrize(
     ("words", "names"),
     [
+        ({}, ("best", *PAPER)),
         ({"causal": True}, PAPER),
         # The printed formulas and one footing for all are asked of the paper's observers.
         ({"as_printed": True}, PAPER),
@@ -183,9 +175,6 @@ def test_a_first_order_observer_settles_in_the_time_of_its_gain_and_a_smoother_a
     # the lead is bounded
     assert lead_samples(MomentumObserver(gain=10.0), 0.1, 7) == LEAD
     assert lead_samples(MomentumObserver(gain=1e-6), 1e-3, 7) == LONGEST
-
-
-# Where observer parameters come from: the command line, the robot file, a file of gains, and what
 
 
 def setup(robot: str, *assignments: str, joints: int = 6, step: float = 0.008) -> Setup:
@@ -316,17 +305,6 @@ def test_a_robot_file_s_gains_are_checked_like_a_gains_file_s(tmp_path):
     path.write_text(text.replace("[observers.gmo]", "[observers.gmoo]"), encoding="utf-8")
     with pytest.raises(ParameterError, match=r"arm.toml: no observer 'gmoo'.* Did you mean gmo"):
         ObserverChoice().build(load_robot(path), 0.008)
-
-
-def test_the_upper_layer_wins_parameter_by_parameter():
-    under = {"kfo": {"r_diag": 1.0, "q_p_diag": 2.0}, "fdo": {"omega": 3.0}}
-    over = {"kfo": {"r_diag": 9.0}, "gmo": {"gain": 4.0}}
-    assert overlay_gains(under, over) == {
-        "kfo": {"r_diag": 9.0, "q_p_diag": 2.0},
-        "fdo": {"omega": 3.0},
-        "gmo": {"gain": 4.0},
-    }
-    assert under["kfo"]["r_diag"] == 1.0  # the robot's own is left alone
 
 
 def test_a_word_that_is_no_file_of_gains_says_which_words_there_are(tmp_path):

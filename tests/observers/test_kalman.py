@@ -134,26 +134,6 @@ def test_hold_is_van_loans_matrix_exponential(decay, step):
     np.testing.assert_allclose(found, Q[[0, 0, 1], [0, 1, 1]], rtol=1e-9, atol=1e-13 * 5000)
 
 
-def test_the_printed_44_is_unsymmetric_indefinite_and_a_quarter_sample_faster():
-    """docs/paper.md: lower-right block −A_c, run all the same. 1e-6 s: the iteration's rest."""
-    A_c, Q_c = np.array([[0.0, 1.0], [0.0, 0.0]]), np.diag([0.01, 5000.0])
-    A = np.eye(2) + STEP * A_c
-    delay = []
-    for block in (-A_c.T, -A_c):
-        M = expm(np.block([[A_c, Q_c], [np.zeros((2, 2)), block]]) * STEP)
-        Q, P = M[:2, 2:] @ M[:2, :2].T, 100.0 * np.eye(2)
-        for _ in range(2000):
-            P = A @ P @ A.T + Q
-            L = P[:, :1] / (P[0, 0] + 0.5 / STEP)
-            rest = np.eye(2) - L @ np.array([[1.0, 0.0]])
-            P = rest @ P @ rest.T + 0.5 / STEP * L @ L.T
-        delay.append(L[0, 0] / L[1, 0] - 0.5 * STEP)
-    assert Q[1, 0] == pytest.approx(2.0 * Q[0, 1], rel=1e-4)  # printed: 2 to Q_p/Q_τ
-    assert np.linalg.eigvalsh(0.5 * (Q + Q.T))[0] < 0.0
-    assert delay[0] == pytest.approx(paper("zoh").tuning(STEP, 6).delay[0], abs=1e-6)
-    assert delay[1] == pytest.approx(delay[0] - 0.25 * STEP, abs=1e-5)
-
-
 @pytest.mark.parametrize("convention", NOISE_CONVENTIONS)
 @pytest.mark.parametrize("scheme", ["fe", "zoh"])
 @pytest.mark.parametrize("step", [0.001, 0.008])
@@ -252,17 +232,16 @@ def steps(gaps: int = 0, seed: int = 4) -> np.ndarray:
 
 
 def looped(
-    observer: KalmanObserver, dt: np.ndarray, prior: Covariance, before: Covariance | None = None
+    observer: KalmanObserver, dt: np.ndarray, prior: Covariance, before: Covariance
 ) -> Gains:
-    """The covariance recursion as it is written, Joseph's form, sample by sample.
+    """The covariance recursion as it is written, Joseph's form: each sample a step from `before`.
 
-    With the covariances of another recursion `before` it, every sample is one step from these:
-    rounding does not add up over the samples.
+    Rounding does not add up over the samples.
     """
     model = observer.model(dt[:, None], len(prior.p11))
     found = [joseph(prior, model.r[0])]
     for k in range(1, len(dt)):
-        p11, p12, p22 = found[-1].posterior if before is None else (p[k - 1] for p in before)
+        p11, p12, p22 = (p[k - 1] for p in before)
         moved = p12 + model.a12[k] * p22
         prior = Covariance(
             p11 + model.a12[k] * (p12 + moved) + model.q11[k],
@@ -318,23 +297,3 @@ def test_gains_are_those_of_the_plain_loop(setting, scheme):
     ours, theirs = (found.l1, found.l2, *found.posterior), (expected.l1, expected.l2)
     for one, other, scale in zip(ours, (*theirs, *expected.posterior), scales, strict=True):
         np.testing.assert_allclose(one / scale, other / scale, rtol=0, atol=1e-12)
-
-
-@pytest.mark.parametrize("q_tau", [1e-3, 5e3, 5e7])
-@pytest.mark.parametrize("scheme", ["fe", "zoh"])
-@pytest.mark.parametrize("samples", [1, 2, 50, 1000])
-def test_the_filter_is_the_plain_loop(samples, scheme, q_tau):
-    dt, rng = steps(5)[:samples], np.random.default_rng(7)
-    p = np.cumsum(rng.normal(0.0, 0.1, (samples, 2)), axis=0)
-    log = DynamicsTerms(t=np.cumsum(dt), p=p, mu=rng.normal(0.0, 5.0, (samples, 2)))
-    observer = KalmanObserver(discretisation=scheme, q_tau_diag=q_tau)
-    found = observer.estimate(log)
-    dt = np.broadcast_to(log.dt[:, 0], samples)
-    gains = looped(observer, dt, observer.first_prior(log.clock.step, 2))
-    model, e, tau = observer.model(dt[:, None], 2), np.zeros(2), np.zeros(2)
-    for k in range(samples):
-        x = e - model.a12[k] * tau + log.d[k]
-        e, tau = (1.0 - gains.l1[k]) * x, model.a22[k] * tau + gains.l2[k] * x
-        # rounding over as many steps, of torques of 10
-        np.testing.assert_allclose(found.tau[k], tau, rtol=1e-12, atol=1e-11)
-    np.testing.assert_allclose(found.sd, np.sqrt(gains.posterior.p22), rtol=1e-12)

@@ -198,9 +198,6 @@ def test_most_joints_decide():
     assert not looks_free(replace(one, loaded=quiet))
 
 
-# The one model of an estimate's error, against sums by hand
-
-
 FRICTION = np.array([4.0, 0.0])
 
 
