@@ -12,20 +12,6 @@ from vftcli.signals.errors import ParameterError
 from vftcli.wrench import FIT, WrenchChoice, ZeroChoice
 
 
-def test_what_is_not_chosen_is_the_flange_smoothed_for_best_by_least_squares_for_others():
-    choice = WrenchChoice.parsed(zero=[])
-    assert choice == WrenchChoice(frame="flange", solver=None)
-    # a named solver is every observer's; the smoother's σ_min, null space and mask are pinv's
-    for solver, by_pose, best, other in (
-        (None, "pinv", True, False),
-        ("smoother", "pinv", True, True),
-        ("map", "map", False, False),
-    ):
-        choice = WrenchChoice(solver=solver)
-        assert choice.by_pose == by_pose
-        assert (choice.smooths("best"), choice.smooths("kfo-fe")) == (best, other)
-
-
 def test_a_zero_is_spans_or_the_start():
     assert ZeroChoice.parsed(["1:2", "8:9"]).spans == ((1.0, 2.0), (8.0, 9.0))
     assert ZeroChoice.parsed(["start"]) == ZeroChoice(start=True)
@@ -52,9 +38,6 @@ def test_what_is_asked_goes_before_the_robot_file():
     np.testing.assert_array_equal(there.tool.translation, [0, 0, 0.1])
     np.testing.assert_array_equal(there.sensor.translation, [0, 0, 0.03])
     assert WrenchChoice(sensor_pose=FIT).mounting(robot).sensor is None
-
-
-# The command line of the virtual sensor, on the circle of the repository's own fixture
 
 
 CIRCLE = Path(__file__).parents[2] / "fixtures" / "ur5_circle.csv"

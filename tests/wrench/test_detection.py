@@ -209,13 +209,6 @@ def test_the_free_part_lasts_from_settling_to_the_first_contact():
         learned_free(T, contacts((1.05, 7.0)))
 
 
-def test_false_alarms_count_by_the_hour_of_the_whole_log():
-    """One alarm in 19.99 s, of which the push holds 5 to 6.99 s: one in 18.00 s, 200 an hour."""
-    score = judged(reference(2.0).tau + np.outer(push(2.0, 12.0, 13.0), [1.0, 0.0]))
-    assert (score.signal, score.detection.false_alarms) == ("torque", 1)
-    assert score.detection.false_alarms_per_h == pytest.approx(200.0)
-
-
 def test_what_is_listed_is_judged_as_it_stands():
     """Two rows for one push: one is credited, the other a piece."""
     reported = KnownContacts(

@@ -31,9 +31,6 @@ from vftcli.wrench.model_error import (
     without_reversals,
 )
 
-# White noise and model error from the free part: against drawn processes and another optimiser
-
-
 STEP = 0.01
 SECONDS = 0.1
 UR5 = load_robot("ur5")
@@ -54,17 +51,6 @@ def cost(logs: np.ndarray, f: np.ndarray, P: np.ndarray) -> float:
     a = np.exp(-SECONDS / T)
     S = SECONDS * (R + s2 * (1 - a**2) / (1 - 2 * a * np.cos(2 * np.pi * f * SECONDS) + a**2))
     return float(np.sum(np.log(S) + P / S) + 0.5 * ((logs[2] - np.log(0.5)) / 1.5) ** 2)
-
-
-@pytest.mark.parametrize(("sd", "time"), [(2.0, 0.5), (3.0, 4.0)])
-def test_a_drawn_process_is_found_again(sd, time):
-    """20 000 blocks: 2000 s of T ≤ 4 s fix s² to √(2·4/2000) = 6 % and T to about twice that."""
-    d = wandering(20_000, sd, time, 1) + 0.3 * np.random.default_rng(2).standard_normal(20_000)
-    f = np.fft.rfftfreq(len(d), SECONDS)[1:]
-    found = fit_spectrum(f, periodogram(d[:, None], SECONDS)[:, 0], SECONDS, 2000.0)
-    assert found[0] == pytest.approx(0.09, rel=0.15)
-    assert np.sqrt(found[1]) == pytest.approx(sd, rel=0.1)
-    assert found[2] == pytest.approx(time, rel=0.2)
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -172,9 +158,6 @@ def test_a_sigmoids_dry_torque_is_its_amplitude():
     amplitudes = [joint.parameters["amplitude"] for joint in panda.friction]
     np.testing.assert_allclose(dry_torques(panda), np.abs(amplitudes))
     assert not dry_torques(replace(UR5, friction=())).any()
-
-
-# The model error that a contact has to exceed
 
 
 def test_what_was_drawn_is_learned():

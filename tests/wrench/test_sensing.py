@@ -141,9 +141,6 @@ def test_samples_that_a_pose_hides_are_counted_with_the_smallest_singular_value(
     assert mask_remark(np.zeros(4, bool), sigma) == mask_remark(hidden, None) == ()
 
 
-# The smoother as a solver beside the others: what it is fed, and what its wrench looks like
-
-
 @pytest.fixture(scope="module")
 def motion() -> FreeMotion:
     """8 s of the circle, free until 4 s."""
@@ -239,9 +236,6 @@ def test_a_load_of_the_free_part_is_in_the_wrench_and_no_noise(motion):
     np.testing.assert_allclose(weight[:, 2], -2.0 * 9.81, rtol=1e-3)
 
 
-# The torque error behind a band: given, measured, brought along or unknown
-
-
 T = np.arange(0.0, 40.0, 0.01)
 
 
@@ -331,9 +325,6 @@ def test_a_part_too_short_for_a_spectrum_is_no_part():
     assert missed_torque(run_of(terms), (MomentumObserver(gain=5.0),), T < 0.05) is None
 
 
-# The mean disturbance: the external torque itself, smoothed without delay, on any clock
-
-
 def terms_of(t: np.ndarray, tau: np.ndarray, mu: np.ndarray) -> DynamicsTerms:
     """Terms whose momentum gains μ + τ by the trapezoid, so that τ is what they leave. (T, 1)"""
     gained = 0.5 * ((mu + tau)[1:] + (mu + tau)[:-1]) * np.diff(t)[:, None]
@@ -361,15 +352,6 @@ def test_a_ramp_keeps_its_place_and_a_step_is_spread_over_the_window():
     expected = np.clip((t - 2.0 + HALF) / (2 * HALF), 0.0, 1.0)
     # the trapezoid puts the step half a sample early, 1 ms of 100
     np.testing.assert_allclose(found, expected, atol=0.01)
-
-
-def test_noise_of_the_velocity_is_averaged_out():
-    """2 mrad/s on 1.5 kg·m²: the difference of two samples 0.1 s apart leaves √2·3e-3/0.1 N·m."""
-    t = np.arange(0.0, 60.0, 0.002)
-    p = 1.5 * 2e-3 * np.random.default_rng(2).standard_normal((len(t), 1))
-    found = mean_disturbance(DynamicsTerms(t=t, p=p, mu=np.zeros_like(p)))
-    # interpolation between neighbours takes a little more off
-    assert np.std(found.tau) == pytest.approx(np.sqrt(2) * 3e-3 / (2 * HALF), rel=0.2)
 
 
 def test_two_samples_tell_the_mean_between_them_and_one_nothing():

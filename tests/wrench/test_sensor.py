@@ -105,9 +105,6 @@ def test_a_pose_that_is_given_is_not_looked_for_nor_one_without_a_sensors_wrench
         find_mounting(log(PUSH, WrenchFrame("base", "flange")), UR5, disturbance(), fit)
 
 
-# A reading beside a reference: which zero is removed, and what is said of the lag
-
-
 TIMES = np.arange(0.0, 20.0, 0.01)
 SPAN = (1.0, 3.0)
 
@@ -202,9 +199,6 @@ def test_a_contact_elsewhere_is_what_exceeds_the_free_part():
     assert contact_elsewhere(wrench(np.where(FREE, np.nan, 2.0)), FREE) == ()
 
 
-# Conventions of vendors: axes, sign, gain, lag and zeros of a logged wrench, each found
-
-
 @pytest.mark.parametrize("seed", range(6))
 def test_any_order_and_sign_of_axes_is_recognised(seed):
     rng = np.random.default_rng(seed)
@@ -283,9 +277,6 @@ def test_a_late_field_is_reported_by_how_much():
     assert late.values["lag_ms"] == pytest.approx(4 * 50.0, abs=12.5)
     # moved back by it both are one signal but for those four
     assert late.values["correlation"] > 0.99
-
-
-# Zero drift: removed, reported, and suspected where it is a contact
 
 
 DRIFT = np.array([-0.43166, -0.53348, 0.83768, -0.16294, 0.13407, 0.09103])

@@ -16,14 +16,13 @@ from vftcli.robots.chain import flange_jacobian
 from vftcli.robots.robot import Robot
 from vftcli.robots.run import Run, RunSamples
 from vftcli.robots.terms import Blocks
-from vftcli.signals.arrays import Array, Mask
+from vftcli.signals.arrays import Array
 from vftcli.signals.errors import RobotError
 from vftcli.signals.external_torque import DynamicsTerms
 from vftcli.signals.wrench import AXES
 from vftcli.wrench.model_error import TorqueNoise
 from vftcli.wrench.smoother import (
     BLOCK,
-    GRID,
     LEVER,
     MOST_BLOCKS,
     UNLISTED,
@@ -302,12 +301,6 @@ NOISE = TorqueNoise(
 PRIOR = WrenchPrior(2.0, 30.0)
 
 
-def moves(blocks: Blocks, inside: Mask) -> tuple[Array, Array]:
-    """Decay and added variance of wrench and model error under `PRIOR`. (K, 12) each"""
-    model = BlockModel(blocks, np.zeros((COUNT, 6, 6)), NOISE, inside).under([PRIOR])
-    return model.decay[:, 0], model.added[:, 0]
-
-
 def test_a_listed_contact_opens_its_blocks_and_one_on_either_side():
     # .55 to .85 s touches blocks 5 to 8
     assert np.flatnonzero(gated(BLOCKS, [(0.55, 0.85)])).tolist() == list(range(4, 10))
@@ -316,35 +309,21 @@ def test_a_listed_contact_opens_its_blocks_and_one_on_either_side():
     assert gated(BLOCKS, None).all()
 
 
-def test_a_wrench_keeps_its_variance_while_it_lasts_and_starts_with_it():
-    inside = gated(BLOCKS, [(0.55, 0.85), (2.0, 2.2)])
-    decay, variance = moves(BLOCKS, inside)
-    assert not decay[~inside, :6].any()
-    assert not variance[~inside, :6].any()
-    stationary = np.repeat([900.0, (LEVER * 30.0) ** 2], 3)
-    for first in (4, 19):
-        assert not decay[first, :6].any()
-        np.testing.assert_allclose(variance[first, :6], stationary)
-    np.testing.assert_allclose(decay[5, :6], np.exp(-SECONDS / 2.0))
-    np.testing.assert_allclose(decay[5, :6] ** 2 * stationary + variance[5, :6], stationary)
-
-
-def test_the_model_error_is_stationary_from_the_first_block_on():
-    decay, variance = moves(BLOCKS, gated(BLOCKS, None))
-    assert not decay[0].any()
-    np.testing.assert_allclose(variance[0, 6:], 4.0)
-    np.testing.assert_allclose(decay[1:, 6:], np.exp(-SECONDS / 0.5))
-    np.testing.assert_allclose(decay[1:, 6:] ** 2 * 4.0 + variance[1:, 6:], 4.0)
-
-
-def test_a_gap_lets_both_decay_by_its_own_length():
+def test_wrench_and_model_error_keep_their_variance_while_they_last():
+    """A contact starts afresh, and a gap of 3 s lets both decay by its own length."""
     late = BLOCKS._replace(t=np.concatenate([T[:10], T[10:] + 3.0]))
-    decay, _ = moves(late, gated(late, None))
-    np.testing.assert_allclose(decay[10, :6], np.exp(-3.1 / 2.0))
-    np.testing.assert_allclose(decay[10, 6:], np.exp(-3.1 / 0.5))
-
-
-def test_what_keeps_for_half_a_minute_and_hardly_changes_in_a_second_is_a_load():
-    """σ_f √(2/τ_w) is 15 N for (30 s, 60 N), pushes in a row, and 5 N for (300 s, 60 N)."""
-    steady = [(prior.time, prior.force) for prior in GRID if prior.is_steady]
-    assert steady == [(30, 10), (100, 10), (100, 30), (300, 10), (300, 30), (300, 60)]
+    inside = gated(late, [(0.55, 2.0), (5.0, 5.2)])
+    model = BlockModel(late, np.zeros((COUNT, 6, 6)), NOISE, inside).under([PRIOR])
+    decay, added = model.decay[:, 0], model.added[:, 0]
+    stationary = np.repeat([900.0, (LEVER * 30.0) ** 2, 4.0, 4.0], 3)
+    assert not decay[~inside, :6].any()
+    assert not added[~inside, :6].any()
+    starts = [np.flatnonzero(inside)[0], np.flatnonzero(np.diff(inside * 1) > 0)[-1] + 1]
+    assert not decay[starts, :6].any()
+    assert not decay[0].any()
+    there = np.hstack([np.repeat(inside[:, None], 6, axis=1), np.ones((COUNT, 6), bool)])
+    kept = decay**2 * stationary + added
+    np.testing.assert_allclose(kept[there], np.broadcast_to(stationary, kept.shape)[there])
+    length = np.where(np.arange(COUNT) == 10, 3.1, SECONDS)[1:, None]
+    np.testing.assert_allclose(decay[1:, 6:], np.repeat(np.exp(-length / 0.5), 6, axis=1))
+    np.testing.assert_allclose(decay[[5, 10], 0], np.exp([-SECONDS / 2.0, -3.1 / 2.0]))
