@@ -32,8 +32,6 @@ from vftcli.signals.errors import (
 )
 from vftcli.signals.recording import Recording
 
-# Identification of logs made here: planted numbers come back, bad logs are refused
-
 
 def motion(seed, duration=30.0, joints=6):
     """Sums of three sines a joint, 0.1 to 0.3 Hz, some rad/s fast; 125 Hz."""
@@ -370,9 +368,6 @@ def test_torques_behind_the_gears_leave_the_friction_method_nothing_to_find():
     assert found.robot.friction == ()
 
 
-# What a score says: rms, causes of a residual, repeated trajectories
-
-
 @pytest.fixture
 def sine_motion(prepared, sines):
     """Eight seconds of motion of a UR5, without torque."""
@@ -392,19 +387,6 @@ def test_rigid_torque_is_pinocchios_without_rotors(sine_motion):
     for k in (0, 500, -1):
         expected = pin.rnea(plain, data, sine_motion.q[k], sine_motion.dq[k], sine_motion.ddq[k])
         np.testing.assert_allclose(sine_motion.rigid[k], expected, atol=1e-9)
-
-
-def test_prediction_adds_rotors_and_filtered_friction(sine_motion):
-    rotors = UR5.chain.rotor_inertia * sine_motion.ddq
-    bare = sine_motion.with_robot(UR5.without_friction()).predicted
-    np.testing.assert_allclose(bare, sine_motion.rigid + rotors, atol=1e-12)
-    friction = sine_motion.predicted - bare
-    joint, dq = UR5.friction[0], sine_motion.dq[:, 0]
-    first = joint.torques[0]
-    law = first * np.tanh(dq / joint.parameters["smoothing"])
-    law += np.sign(dq) * (np.interp(np.abs(dq), joint.speeds, joint.torques) - first)
-    expected = sine_motion.filtered(law[:, None])[:, 0]
-    np.testing.assert_allclose(friction[:, 0], expected, atol=1e-9)
 
 
 @pytest.mark.parametrize("mass", [1.5, -0.8])

@@ -23,7 +23,6 @@ from vftcli.identification.links import (
     thicken_links,
     triangle,
     triangulate,
-    truncated_step,
 )
 from vftcli.identification.shapes import Shape
 from vftcli.identification.training import ParameterColumns, PreparedLog
@@ -88,34 +87,6 @@ def test_triangles_are_the_weighted_equations(log):
     assert total == pytest.approx(np.sum((rows[:, -1] - rows[:, :-1] @ x) ** 2), rel=1e-9)
     # white noise: neighbours count as one each, to what 625 samples can tell
     assert triangles.correlation == pytest.approx(1.0, abs=0.3)
-
-
-def test_stacking_finds_what_was_planted(log):
-    start = planted() * 1.1
-    triangles = stack(LAYOUT, [log], start)
-    R, z = triangles.joined()
-    x = start + truncated_step(R, z - R @ start)[0]
-    left = residuals(LAYOUT, log, x)
-    # 53 parameters of 3750 equations take 1.4 % of the noise's square
-    np.testing.assert_allclose(np.std(left, axis=0), [0.5, 0.5, 0.5, 0.1, 0.1, 0.1], rtol=0.1)
-
-
-def test_least_squares_leaves_the_start_where_there_is_no_data():
-    rng = np.random.default_rng(8)
-    q, dq, ddq = rng.uniform(-2, 2, (3, 300, 6))
-    layout = ParameterColumns(CHAIN, False, (Shape(()),) * 6)
-    Y = torque_regressor(CHAIN, q, dq, ddq)
-    start = chain_parameters(CHAIN)
-    true = start * (1.0 + 0.1 * rng.standard_normal(60))
-    tau = Y @ true + 0.1 * rng.standard_normal((300, 6))
-    rows = np.concatenate([Y, tau[:, :, None]], axis=2) / 0.1
-    parts = tuple(triangle(part.reshape(-1, 61)) for part in np.array_split(rows, 5))
-    R, z = Triangles(layout, parts, 1.0).joined()
-    x = start + truncated_step(R, z - R @ start)[0]
-    # the first link's mass moves nothing: no motion tells it
-    assert x[0] == pytest.approx(start[0], rel=1e-12)
-    # noise 0.1·√(36/1800) = 0.014, and truncation
-    assert np.sqrt(np.mean((Y @ (x - true)) ** 2)) < 0.05
 
 
 def frictionless(name, rotor):
@@ -195,9 +166,6 @@ def test_what_no_data_tells_keeps_the_start_and_has_no_spread(excited):
     assert triangles.layout.names[70] == "coulomb6"
     (row,) = [row for row in found.to_dicts() if row["parameter"] == "coulomb6"]
     assert row == {"parameter": "coulomb6", "value": start[70], "sd": np.inf, "determined": False}
-
-
-# The physical links nearest to least squares
 
 
 def stacked(chain, phi, noise, seed=0, samples=300):

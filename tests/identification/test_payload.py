@@ -9,7 +9,6 @@ from vftcli.identification.payload import (
     REACH,
     STRETCHES,
     NotSameMotionError,
-    different_poses,
     find_time_shift,
     fit_all_joints,
     load_at_flange,
@@ -305,11 +304,6 @@ def test_how_logs_differ_belongs_in_the_standard_deviation(seed):
     # the mean's standard deviation by the spread alone; poses differ, so half or twice of it
     spread = np.std(each, ddof=1) / np.sqrt(20)
     assert 0.5 * spread < fit.mass_sd < 2.5 * spread
-
-
-def test_poses_that_repeat_count_once():
-    assert different_poses(np.zeros((0, 7))) == 0
-    assert different_poses(np.array([[0.0, 0.0], [0.05, 0.0], [0.2, 0.0], [0.21, 0.05]])) == 2
 
 
 @pytest.mark.slow

@@ -14,7 +14,6 @@ from vftcli.identification.targets import (
     ControllerTargets,
     Estimate,
     constant_at_rest,
-    constant_in_motion,
     controller_friction,
     controller_models,
     refuse_guided,
@@ -43,13 +42,6 @@ def targets(prepared, sines) -> ControllerTargets:
     current = (moment + log.filtered(friction)) / K
     lead = np.gradient(moment, t, axis=0)
     return ControllerTargets((log,), dq, ddq, current, moment, lead, rigid, gravity)
-
-
-def test_the_drive_constant_comes_from_currents_that_follow_moments(targets):
-    found = constant_in_motion(0, targets)
-    # smoothing .01 of the shapes is the friction's own: exact but for the reversals' filter
-    assert found.value == pytest.approx(K, rel=1e-6)
-    assert found.known
 
 
 def test_rotor_and_gravity_come_from_moments_beyond_the_rigid_body(targets):

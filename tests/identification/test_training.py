@@ -8,20 +8,17 @@ import pytest
 
 from vftcli.identification import friction_fit
 from vftcli.identification.clean_fit import CleanFit
-from vftcli.identification.friction_fit import PreslidingScore, all_residuals, fit_frictions
+from vftcli.identification.friction_fit import PreslidingScore, fit_frictions
 from vftcli.identification.links import stack
 from vftcli.identification.methods import (
     by_constant,
     check_friction,
     fit_remarks,
     friction_method,
-    identified_friction,
     initial_columns,
     rotor_number,
     whole_arm,
-    with_vector,
 )
-from vftcli.identification.shapes import bent
 from vftcli.identification.training import (
     moving_joints,
     prepare,
@@ -30,7 +27,7 @@ from vftcli.identification.training import (
     stride,
     usable_samples,
 )
-from vftcli.robots import JointFriction, Payload, load_robot
+from vftcli.robots import JointFriction, load_robot
 from vftcli.robots.kernels import chain_parameters, torque_regressor
 from vftcli.signals.errors import IdentificationError
 from vftcli.signals.recording import Recording
@@ -53,16 +50,6 @@ def test_a_joint_moves_for_a_second_and_reverses_for_a_tenth_of_it(prepared):
     assert moving_joints([log, log])[0].tolist() == [True, True, True, True, False, True]
     with pytest.raises(IdentificationError, match="no joint moves faster than"):
         moving_joints([prepared(T, dq=dq[:, 2:5])])
-
-
-def test_residuals_are_cut_apart_log_by_log(recording, arm):
-    logs = [recording, recording.between(0.0, 7.0)]
-    data = prepare_training(logs, arm)
-    fits = fit_frictions(data)
-    first, second = all_residuals(data, fits)
-    assert (len(first), len(second)) == tuple(log.samples for log in data.logs)
-    whole = fits[3].fit.residual
-    np.testing.assert_array_equal(np.concatenate([first[:, 3], second[:, 3]]), whole)
 
 
 def test_drive_constants_need_currents(recording, arm):
@@ -136,18 +123,6 @@ def test_what_was_fitted_is_remarked_on_in_its_units(data, prepared):
     ]
 
 
-def test_points_of_a_line_are_listed_beside_the_profile_s(data):
-    arm, sd = load_robot("ur5"), np.array([0.29, 0.31, 0.1])
-    old, x = data._replace(robot=arm), np.array([1.0, -1.0, 0.3])
-    friction, numbers = identified_friction(old, 1, bent(2.0), x, sd, "base")
-    assert friction.confidence == (
-        "identified (base) from recording (sha256 unknown); standard deviations 0.29, 0.31, 0.1"
-    )
-    found = [(n.joint, n.value, n.sd, n.profile, n.determined) for n in numbers]
-    rows = zip([2] * 3, x, sd, arm.friction[1].torques[:3], [True, False, False], strict=True)
-    assert found == list(rows)
-
-
 def test_a_current_that_falls_with_the_torque_is_refused(data):
     before = data.robot.torque_constant[1]
     values, sd, K = by_constant(data, 1, np.array([8.0, 0.8]), np.array([0.4, 0.02]))
@@ -171,26 +146,6 @@ def test_a_wrong_drive_constant_scales_friction_and_rotor(recording, arm):
     coulomb = {n.joint: n for n in found.numbers if n.parameter == "coulomb"}
     assert coulomb[2].value == pytest.approx(4.0, rel=0.05)
     assert found.robot.torque_constant[1] == pytest.approx(K[2].value, rel=1e-6)
-
-
-def test_the_whole_arm_starts_from_the_profile_and_the_fits(data, arm):
-    fits = fit_frictions(data)
-    layout, start = initial_columns(data, fits)
-    np.testing.assert_array_equal(start[:60], chain_parameters(arm.loaded_chain))
-    assert start[60 + 1] == fits[1].fit.values[len(fits[1].shape.terms)]
-    np.testing.assert_array_equal(start[layout.frictions[2]], fits[2].fit.values[:-1])
-    held = {j: fit for j, fit in fits.items() if j}
-    layout, start = initial_columns(data, held)
-    assert layout.shapes[0].terms == ("coulomb", "viscous", "offset")
-    np.testing.assert_array_equal(start[layout.frictions[0]], [4.0, 6.0, 0.5])
-    np.testing.assert_allclose(start[60], arm.chain.rotor_inertia[0])
-    # a vector becomes a robot without its payload
-    load = Payload(mass=1.0, com=np.zeros(3), inertia=np.zeros((3, 3)))
-    start[10], start[60:66] = 9.5, 2.5
-    robot = with_vector(arm.with_payload(load), layout, start, arm.friction)
-    assert robot.payload is None
-    np.testing.assert_array_equal(robot.chain.rotor_inertia, 2.5)
-    np.testing.assert_allclose(chain_parameters(robot.chain), start[:60], atol=1e-9)
 
 
 @pytest.mark.slow
@@ -230,9 +185,6 @@ def test_a_joint_that_the_profile_predicts_better_keeps_its_numbers(data, arm, m
     assert reported == [(j,) for j in range(1, 7)]
     assert found.robot.friction == arm.friction
     np.testing.assert_array_equal(found.robot.chain.rotor_inertia, arm.chain.rotor_inertia)
-
-
-# From a log to filtered, decimated signals
 
 
 PANDA = load_robot("panda")
