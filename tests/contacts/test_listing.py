@@ -14,7 +14,6 @@ from drawn_blocks import B, blocks
 from known_errors import shortened
 from sound_logs import PRESS, UR10E
 
-from vftcli.contacts.contact_list import ContactList
 from vftcli.contacts.listing import adjoining, follows_stop, is_load, list_contacts, rests_around
 from vftcli.free_motion import FreeChoice
 from vftcli.free_motion.free_motion import FreeMotion
@@ -27,8 +26,6 @@ from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.recording import Recording
 from vftcli.simulation import load_scenario, simulate
-
-Lister = Callable[..., ContactList]
 
 
 @pytest.mark.slow
@@ -299,22 +296,6 @@ def test_an_arm_of_three_joints_has_times_and_torques_but_no_newtons():
 
 
 @pytest.mark.slow
-def test_a_load_that_stays_to_the_end_of_the_log_is_listed():
-    """The bearing of 9.2 N hangs from 4 s on; its mean is within its band.
-
-    A wrench that wanders within a second pays for every block of a load that lasts 5 s.
-    """
-    scenario = replace(load_scenario("panda-bearing", ["sensing.rate=250"]), duration=9.0)
-    made = simulate(scenario)
-    log = Run(recording=made.recording, robot=load_robot("panda"))
-    motion = FreeMotion(log=log, choice=FreeChoice.parsed(free=["0.3:3.9"]))
-    (row,) = list_contacts(motion).contacts
-    assert row.start == pytest.approx(4.2, abs=0.3)
-    assert row.stop == pytest.approx(9.0, abs=0.1)
-    assert row.wrench[2] < 0.0
-
-
-@pytest.mark.slow
 def test_pushes_whose_ends_the_models_error_hides_keep_their_size():
     """Slow pushes, nothing free named: between their listed ends alone they look 10 % smaller.
 
@@ -418,9 +399,6 @@ def test_a_row_without_a_size_belongs_to_the_one_that_it_adjoins():
     assert adjoining([], []) == []
 
 
-# Contacts that are a load
-
-
 def long_motion() -> Recording:
     """An arm that moves from 2 s to 20 s, but for a rest from 8 s to 10.5 s."""
     t = 0.01 * np.arange(2000)
@@ -481,9 +459,6 @@ def test_a_push_may_begin_with_the_log(start, is_one):
     still = Recording(t=t, q=0.0 * dq, dq=dq, torque=np.zeros_like(dq))
     row = replace(contact(), start=start, stop=19.5, mean_force=DOWN)
     assert is_load(still, (row,)) is is_one
-
-
-# Abrupt stops, what is none, and the rest around a contact
 
 
 T = 0.01 * np.arange(400)

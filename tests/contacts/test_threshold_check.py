@@ -137,9 +137,6 @@ def test_an_alarm_that_stays_on_detects_nothing_new():
     assert np.isnan(check.largest_missed)
 
 
-# What a robot compares: its own estimate where the log has one, else a momentum observer's
-
-
 FIXTURES = Path(__file__).parent.parent.parent / "fixtures"
 
 

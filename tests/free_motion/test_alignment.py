@@ -1,6 +1,5 @@
 """Two logs of one motion: shift, clock rate, shared part, and refusals."""
 
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -11,7 +10,6 @@ from vftcli.free_motion.alignment import align
 from vftcli.readers.reading import read
 from vftcli.signals.errors import ReferenceTorqueError
 from vftcli.signals.recording import Recording
-
 
 
 def wandering(samples: int = 2000, seed: int = 3) -> Recording:

@@ -22,11 +22,6 @@ from vftcli.robots.run import Run
 from vftcli.signals.errors import ReferenceTorqueError
 from vftcli.signals.recording import Recording
 
-# The period, the cycles, and one clear line for each log that has none
-
-
-Make = Callable[..., Recording]
-
 WITHIN = 2e-4
 """Required: the period to 0.02 %."""
 
@@ -184,9 +179,6 @@ def test_a_log_that_is_nearly_all_gap_is_refused(repeated):
         find_period(replace(log, t=log.t + 1e6 * late))
 
 
-# Which cycles count as free: the one with the least residual, and those like it
-
-
 T = 0.01 * np.arange(1200)
 
 CYCLES = Cycles(period=4.0, begin=0.0, end=12.0)
@@ -223,7 +215,6 @@ def pushed(drive_of: MakesRun) -> Callable[..., Run]:
 def test_all_cycles_without_a_push_are_free(pushed, instants, free):
     found = find_free_cycles(pushed(*instants), CYCLES)
     assert found.numbers == free
-    assert found.residuals is not None
     # 5 N·m for half a second against noise of 0.1 N·m that is low-passed at 5 Hz: 40 times.
     assert np.all((found.residuals > 10.0) == ~np.isin(np.arange(3), free))
 
@@ -246,7 +237,6 @@ def test_a_log_shorter_than_a_cycle_has_no_free_one(pushed):
 def test_a_cycle_in_a_gap_is_not_free_and_the_others_are_judged(pushed):
     with_gap = pushed(t=T + 40.0 * (T >= 6.0))
     found = find_free_cycles(with_gap, Cycles(period=4.0, begin=0.0, end=52.0))
-    assert found.residuals is not None
     assert set(np.flatnonzero(np.isfinite(found.residuals))) == {0, 1, 11, 12}
     assert set(found.numbers) <= {0, 1, 11, 12}
 

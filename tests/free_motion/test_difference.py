@@ -22,9 +22,6 @@ from vftcli.robots.run import Run
 from vftcli.signals.errors import ReferenceTorqueError
 from vftcli.signals.filters import low_pass
 
-# The alignment ladder: what a difference is on each rung, and which rung is used
-
-
 Make = Callable[..., Run]
 T = 0.008 * np.arange(1500)
 RNG = np.random.default_rng(4)
@@ -74,9 +71,6 @@ def test_the_simpler_of_two_alike_is_taken():
     assert most_certain(stood)[0].rung == "model"
 
 
-# What a difference cannot know: the pieces its error is made of, on signals of known size
-
-
 STEP = 0.008
 TIMES = STEP * np.arange(6000)
 MOVING = np.ones((6000, 1), dtype=bool)
@@ -97,16 +91,6 @@ def test_what_a_low_pass_leaves_of_white_noise(cutoff):
     x = np.random.default_rng(2).standard_normal((6000, 1))
     left = float(np.sqrt(np.mean(low_pass(TIMES, x, cutoff) ** 2)))
     assert noise_of(TIMES, x, MOVING, STEP, cutoff) == pytest.approx(left, rel=0.1)
-
-
-def test_noise_is_measured_beside_the_cutoff():
-    """Above contacts, at least .2 of the rate, up to .45; pink, so that each band differs."""
-    x = np.cumsum(np.random.default_rng(3).standard_normal((6000, 1)), axis=0)
-    faster = (0.008, 6.0, 8.4, 15.6), (0.008, 20.0, 14.0, 26.0)
-    for step, cutoff, *limits in (*faster, (0.02, 20.0, 14.0, 22.5), (0.04, 4.0, 3.5, 6.5)):
-        t = step * np.arange(6000)
-        expected = noise_below(t, x, MOVING, step, tuple(limits), cutoff)
-        np.testing.assert_allclose(noise_of(t, x, MOVING, step, cutoff), expected, rtol=1e-9)
 
 
 def coloured(memory: float, seed: int) -> np.ndarray:
@@ -175,9 +159,6 @@ def test_the_floor_is_over_all_samples_and_the_floor_in_motion_over_those_that_m
     assert ErrorModel(sd, standing).trusted_joints.tolist() == [True, False]
 
 
-# What differs between a log and its free runs, against the plain sums over them
-
-
 CLOCK = 0.008 * np.arange(600)
 
 
@@ -202,7 +183,6 @@ def test_the_differences_are_those_of_the_mean_over_the_free_runs(drive_of):
         # Where the second has ended the first stands alone.
         mean = np.where(np.isnan(there[1]), there[0], np.add(*there) / 2.0)
         np.testing.assert_array_equal(made, sign * (getattr(log, name) - mean))
-    assert pair.torque is pair.torque  # made once, whatever rungs and cutoffs ask for it
     np.testing.assert_array_equal(pair.known, np.isfinite(pair.torque).all(axis=1))
     there = [p.there(p.free.standing.astype(float)) > 0 for p in pairings]
     np.testing.assert_array_equal(pair.standing, log.standing | there[0] | there[1])
@@ -233,15 +213,6 @@ def test_phase_finds_the_place_up_to_a_tenth_of_a_second_away(drive_of, late, mo
     middle = (CLOCK > 0.5) & (CLOCK[-1] - 0.5 > CLOCK)  # a partner lies within the free run
     # A Gauss–Newton step is damped by a hundredth, four of them by 1e-8.
     np.testing.assert_allclose(times[middle], CLOCK[middle] - moved, atol=1e-4)
-
-
-def test_a_run_is_laid_by_shift_and_rate_as_far_as_it_goes(drive_of):
-    pairing = pair_with_run(
-        CLOCK, drive_of(CLOCK, np.column_stack([CLOCK]), np.ones((600, 1))), 1.0, 1.1
-    )
-    known = CLOCK[-1] >= 1.1 * CLOCK + 1.0
-    np.testing.assert_array_equal(pairing.known, known)
-    np.testing.assert_allclose(pairing.times[known], 1.1 * CLOCK[known] + 1.0)
 
 
 def test_no_partner_is_made_up_in_a_gap(drive_of):

@@ -1,6 +1,6 @@
 """What is known to be free beside a log: spans, cycles, other runs, and any of them together."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -31,7 +31,6 @@ from vftcli.signals.external_torque import DynamicsTerms
 from vftcli.signals.recording import Recording
 
 ROBOT = load_robot("ur5")
-Make = Callable[[Recording, float, float], Recording]
 
 
 @pytest.fixture(scope="module")
@@ -165,9 +164,6 @@ def test_the_log_itself_is_no_free_run(circle):
         FreeMotion(log=circle, runs=(run,))
 
 
-# A payload that nobody named: weighed in the free part, and not mistaken for noise
-
-
 PAYLOAD = np.array([2.8, 0.05, 0.02, 0.17])
 """Mass and first moment. [kg, kg·m]"""
 
@@ -195,7 +191,6 @@ def test_a_payload_is_weighed_and_reported(log):
     """
     found = baseline(carrying(log))
     load, gain = found.load, gain_sd(log, ROBOT)
-    assert load is not None
     assert load.mass == pytest.approx(2.8, abs=0.3)
     assert load.sd >= gain * load.mass
     assert np.all(load.moment_sd >= gain * np.abs(load.moment))
@@ -299,9 +294,6 @@ def test_a_column_of_friction_has_the_direction_of_its_joint(log):
     np.testing.assert_allclose(friction[fast], np.sign(dq[fast]), atol=1e-3)
 
 
-# What a user may choose of free motion: parsed and checked once, alike in every command
-
-
 def test_a_span_of_free_is_the_free_part_and_a_log_may_hold_a_colon():
     choice = FreeChoice.parsed(free=["2:4", "run.csv", ":1", "./2:4", "C:/run.csv"])
     assert choice.spans == ((2.0, 4.0), (-np.inf, 1.0))
@@ -311,7 +303,6 @@ def test_a_span_of_free_is_the_free_part_and_a_log_may_hold_a_colon():
 def test_what_counts_as_given():
     assert not FreeChoice().is_given
     assert not FreeChoice(period=4.0).is_given
-    assert FreeChoice(period=4.0).period == 4.0
     for choice in ({"logs": (Path("a"),)}, {"spans": ((0.0, 1.0),)}, {"cycles": (1,)}):
         assert FreeChoice(**choice).is_given  # type: ignore[arg-type]
 

@@ -78,7 +78,6 @@ def test_default_beats_the_commanded_period(circle, ur5):
 def test_every_rung_knows_its_error(circle, ur5, rung, low_pass):
     choice = FreeChoice(period=4.0, alignment=rung, low_pass=low_pass)
     reference = two_cycle_difference(circle.recording, (), ur5, choice)
-    assert reference.floor is not None
     ratio = (error_of(reference, circle.truth) / reference.floor)[MOVING]
     # Required of the default rung; the others take J4's short stops for worse than they are.
     least = HONEST[0] if (rung, low_pass) == ("model", 12.0) else 0.6
@@ -90,7 +89,6 @@ def test_free_cycle_and_joint_at_rest_are_reported(circle, ur5):
     t = circle.recording.t
     assert np.isnan(reference.tau[t < 3.99]).all()  # the free cycle has no reference of its own
     assert np.isfinite(reference.tau[(t > 4.01) & (t < 19.9)]).all()
-    assert reference.moving is not None
     rests = reference.moving[reference.known.all(axis=1)].mean(axis=0) < 0.5
     assert rests.tolist() == [False, False, False, False, True, False]
     remarks = {remark.code: remark for remark in reference.remarks if isinstance(remark, Remark)}
@@ -107,8 +105,6 @@ def test_two_free_cycles_measure_the_floor(circle, ur5):
     choice = FreeChoice(cycles=(2, 3))
     pushed = two_cycle_difference(circle.recording, (), ur5, choice)
     free = two_cycle_difference(circle.recording, (), ur5)
-    assert pushed.floor is not None
-    assert free.floor is not None
     assert np.all(pushed.floor[MOVING] > 1.5 * free.floor[MOVING])
     assert "floor-measured" in {r.code for r in pushed.remarks if isinstance(r, Remark)}
 
@@ -121,7 +117,6 @@ def test_missing_samples(circle, ur5):
     names = ("t", "q", "dq", "current")
     cut = Recording(**{n: getattr(log, n)[keep] for n in names}, robot_hint=log.robot_hint)
     reference = two_cycle_difference(cut, (), ur5)
-    assert reference.floor is not None
     ratio = (error_of(reference, circle.truth[keep]) / reference.floor)[MOVING]
     assert np.all((ratio >= HONEST[0]) & (ratio <= HONEST[1])), ratio
     hole = (cut.t > 4.0 + 0.85) & (cut.t < 4.0 + 0.95)  # samples 100 to 124 one cycle later
@@ -154,9 +149,6 @@ def test_floor_covers_real_free_pairs(repeats, pair, low_pass):
 
 def shares_of_error(reference: ExternalTorque) -> tuple[np.ndarray, np.ndarray]:
     """What a difference of free runs shows over what it expects: in motion, and over all. (n,)"""
-    assert reference.floor is not None
-    assert reference.moving is not None
-    assert reference.sd is not None
     known = reference.known
     found = []
     for used in (reference.moving & known, known):
@@ -264,9 +256,6 @@ def test_pushes_are_not_taken_for_it(swing, seed):
     assert np.array_equal(friction_change(motion, tau, np.ones_like(tau, bool)), [0.0, 0.0])
 
 
-# The ladder's required figures over stiff servo, soft servo and clock drift, five seeds each
-
-
 STICKS = "friction.presliding=0"
 """The joints that the figures are required of."""
 SETTINGS = {
@@ -290,7 +279,6 @@ def errors_of(run: Simulation, choice: FreeChoice) -> tuple[Array, Array]:
     log = run.recording
     truth = np.column_stack([np.interp(log.t, run.truth.t, x) for x in run.truth.tau_ext.T])
     reference = two_cycle_difference(log, (), load_robot("ur5"), choice)
-    assert reference.floor is not None
     shown = np.sqrt(np.nanmean((reference.tau - truth) ** 2, axis=0))
     return shown[MOVING], reference.floor[MOVING]
 

@@ -176,7 +176,6 @@ def test_the_expected_error_is_the_measured_one(name):
     """The spectra predict the rmse that the tuned observer then has against the truth."""
     loaded, free = pushed()
     observer = tune_to_spectra(name, spectra_of(loaded, [free]))
-    assert observer.curve is not None
     tau = observer.estimate(loaded.run.terms).tau
     truth = 5.0 * low_passed_noise(8000, 6.0, 1) * loaded.inside[:, None]
     inner = loaded.inside.copy()
