@@ -107,10 +107,6 @@ def edited(signal: Array, joint: int, values: Any) -> Array:
 # The arm, its order and its signs
 
 
-def wrong_robot(table: Table) -> Table:
-    return replace(table, given=NEIGHBOURS[table.robot])
-
-
 def turned(table: Table, signals: tuple[str, ...], joint: int = 2) -> Table:
     """Some signals of one joint with the other sign."""
     sign = 1.0 - 2.0 * (np.arange(1, table.joints + 1) == joint)
@@ -187,10 +183,6 @@ def effort_offset(table: Table, joint: int = 3, share: float = 0.2) -> Table:
     return replace(table, effort=edited(table.effort, joint, column + more))
 
 
-def effort_zero(table: Table, joint: int = 5) -> Table:
-    return replace(table, effort=edited(table.effort, joint, 0.0))
-
-
 def saturated(table: Table, joint: int = 2, share: float = 0.6) -> Table:
     column = table.effort[:, joint - 1]
     level = share * float(np.max(np.abs(column)))
@@ -213,11 +205,6 @@ def velocity_filtered(table: Table, cut_off: float = 1.0) -> Table:
     return replace(table, dq=lfilter([1 - keep], [1, -keep], table.dq, axis=0, zi=start)[0])
 
 
-def velocity_held(table: Table, samples: int = 8) -> Table:
-    rows = np.arange(len(table.t))
-    return replace(table, dq=table.dq[rows - rows % samples])
-
-
 def stuck(table: Table, signal: str, joint: int, start: float = 0.5) -> Table:
     """One joint's signal stands still from a share `start` of the log on."""
     column = np.array(getattr(table, signal)[:, joint - 1])
@@ -226,16 +213,7 @@ def stuck(table: Table, signal: str, joint: int, start: float = 0.5) -> Table:
     return replace(table, **{signal: edited(getattr(table, signal), joint, column)})
 
 
-def quantised(table: Table, step: float = 1e-3) -> Table:
-    return replace(table, q=np.round(table.q / step) * step)
-
-
 # Clocks and rows
-
-
-def clock_skew(table: Table, share: float = 0.05) -> Table:
-    """The clock counts (1 + share) seconds a second."""
-    return replace(table, t=table.t[0] + (1 + share) * (table.t - table.t[0]))
 
 
 def dropped(table: Table, share: float = 0.05, seed: int = 0) -> Table:
@@ -298,7 +276,9 @@ class Fault(NamedTuple):
 
 
 FAULTS: Mapping[str, Fault] = {
-    "wrong_robot": Fault(wrong_robot, ("other-robot", "no-robot-fits")),
+    "wrong_robot": Fault(
+        lambda t: replace(t, given=NEIGHBOURS[t.robot]), ("other-robot", "no-robot-fits")
+    ),
     "one_sign_J2": Fault(partial(turned, signals=("effort",)), ("joint-sign",), (2,)),
     "all_signs": Fault(lambda t: replace(t, effort=-t.effort), ("effort-sign",)),
     "degrees": Fault(
@@ -314,7 +294,9 @@ FAULTS: Mapping[str, Fault] = {
     "velocity_swapped_J2_J3": Fault(partial(swapped, signals=Speed), ("velocity-order",), (2, 3)),
     "velocity_lag_3": Fault(partial(late, signal="dq", samples=3), ("velocity-lag",)),
     "velocity_1Hz_filtered": Fault(velocity_filtered, ("velocity-filtered",)),
-    "velocity_held_8": Fault(velocity_held, ("velocity-held",)),
+    "velocity_held_8": Fault(
+        lambda t: replace(t, dq=np.repeat(t.dq[::8], 8, axis=0)[: len(t.t)]), ("velocity-held",)
+    ),
     "effort_lag_5": Fault(partial(late, signal="effort", samples=5), ("effort-lag",)),
     "payload_2.8kg": Fault(payload, ("unmodelled-load",)),
     "gravity_compensated": Fault(
@@ -329,7 +311,9 @@ FAULTS: Mapping[str, Fault] = {
     "current_mA": Fault(
         lambda t: replace(t, effort=1e3 * t.effort), ("milliamperes",), signal="current"
     ),
-    "clock_skew_5%": Fault(clock_skew, ("clock-rate",)),
+    "clock_skew_5%": Fault(
+        lambda t: replace(t, t=t.t[0] + 1.05 * (t.t - t.t[0])), ("clock-rate",)
+    ),
     "dropped_5%": Fault(dropped, ("missing-samples",)),
     "dropped_1s": Fault(dropped_span, ("gaps",)),
     "duplicate_rows_10%": Fault(duplicate_rows, ("repeated-stamps",)),
@@ -338,11 +322,15 @@ FAULTS: Mapping[str, Fault] = {
     "stuck_position_J4": Fault(partial(stuck, signal="q", joint=4), ("stuck-position",), (4,)),
     "stuck_effort_J3": Fault(partial(stuck, signal="effort", joint=3), ("stuck-effort",), (3,)),
     "saturated_J2": Fault(saturated, ("saturation",), (2,)),
-    "quantised_1mrad": Fault(quantised, ("coarse-positions",)),
+    "quantised_1mrad": Fault(
+        lambda t: replace(t, q=np.round(t.q / 1e-3) * 1e-3), ("coarse-positions",)
+    ),
     "ceiling_mount": Fault(partial(mounted, angle=180.0), ("upside-down",)),
     "wall_mount_30deg": Fault(partial(mounted, angle=-30.0), ("tilted-base",)),
     "NaN_burst": Fault(nan_burst, (READER,)),
-    "effort_zero_J5": Fault(effort_zero, ("zero-effort",), (5,)),
+    "effort_zero_J5": Fault(
+        lambda t: replace(t, effort=edited(t.effort, 5, 0.0)), ("zero-effort",), (5,)
+    ),
     "offset_J3_20pct": Fault(effort_offset, ("effort-offset",), (3,)),
     "tau_ext_inverted": Fault(
         lambda t: replace(t, tau_ext=-t.tau_ext), ("vendor-sign",), signal="tau"

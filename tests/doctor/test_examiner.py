@@ -18,7 +18,6 @@ UR5E = load_robot("ur5e")
 
 
 def excited(seconds: float = 12.0) -> Recording:
-    """A UR5e's motion with its torques."""
     log = moving("ur5e", seconds=seconds)
     return replace(log, current=None, torque=log.require("current") * UR5E.torque_constant)
 

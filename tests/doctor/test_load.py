@@ -176,9 +176,6 @@ def test_a_load_is_off_by_its_deviation():
     assert np.sqrt(np.mean(np.square(errors))) < 1.8
 
 
-# What the doctor says of joint temperatures: far from the model's, beyond the law, or missing
-
-
 TIMES = 0.008 * np.arange(500)
 SPEED = np.array([1.0, 1.0, 1.0, 1.0, 1.0, 0.0])
 """Joint 6 rests. [rad/s]"""
