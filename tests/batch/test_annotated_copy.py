@@ -20,7 +20,7 @@ from vftcli.observers import ObserverChoice
 from vftcli.readers.reader import ReadChoice
 from vftcli.readers.reading import recognise
 from vftcli.robots import RobotChoice
-from vftcli.signals.errors import LogError, ParameterError, VftError
+from vftcli.signals.errors import LogError, ParameterError
 from vftcli.signals.progress import heard_by
 from vftcli.wrench import WrenchChoice
 
@@ -311,11 +311,6 @@ def test_droid_s_episodes_have_the_errors_of_the_model(
     assert recognise(copy).name == "droid"
     original = next((samples / "droid_raw").rglob("trajectory.h5"))
     assert original.stat().st_nlink == 1
-
-
-def test_efforts_that_were_never_measured_are_refused(samples: Path, tmp_path: Path) -> None:
-    with pytest.raises(VftError, match="the effort of J1, J2, J3, J4, J5, J6 is 0"):
-        made(samples / "lerobot_v3_effort_zero", tmp_path / "copy")
 
 
 @pytest.mark.skipif(

@@ -55,38 +55,31 @@ observers.gmo.gain = 12.0
     assert load_robot(path, tip="left_tool0").chain.names[0] == "left_joint1"  # the option wins
 
 
+FOLLOWERS = [f"{side}_{bone}_joint" for side in ("left", "right") for bone in ("knuckle", "tip")]
+
+
 @pytest.mark.parametrize(
-    ("text", "angles"),
+    ("text", "angles", "more"),
     [
-        (fingered(), {"finger_joint1": 0.03, "finger_joint2": 0.01}),
-        (clawed(), {"finger_1": 0.7, "fingertip_1": -0.4, "finger_3": 0.2}),
-        (mobile(), {"x_joint": 0.4, "yaw_joint": 0.8, "lift_joint": 0.3, "piston_joint": -0.5}),
+        (fingered(), {"finger_joint1": 0.03, "finger_joint2": 0.01}, {}),
+        (clawed(), {"finger_1": 0.7, "fingertip_1": -0.4, "finger_3": 0.2}, {}),
+        (
+            mobile(),
+            {"x_joint": 0.4, "yaw_joint": 0.8, "lift_joint": 0.3, "piston_joint": -0.5},
+            {},
+        ),
+        # what follows goes with it: the URDF's multiplier −1 and offset 0.1
+        (knuckled(), {"finger_joint": 0.3}, dict.fromkeys(FOLLOWERS, -0.2)),
+        (robot(link("base"), arm(7)), {"joint1": 0.4}, {}),  # a torso that the arm stands on
     ],
-    ids=["fingered", "clawed", "mobile"],
+    ids=["fingered", "clawed", "mobile", "knuckled", "torso"],
 )
-def test_what_is_locked_at_an_angle_is_where_pinocchio_holds_it(text, angles, tmp_path):
+def test_what_is_locked_at_an_angle_is_where_pinocchio_holds_it(text, angles, more, tmp_path):
     table = ", ".join(f"{name} = {angle}" for name, angle in angles.items())
     found = load_robot(beside(tmp_path, text, f"lock = {{{table}}}\n"))
-    agrees_with_pinocchio(text, found, angles)
+    assert not angles.keys() & {*found.chain.names}
+    agrees_with_pinocchio(text, found, angles | more)
     assert all(f"{name} at {angle:g}" in str(found.remarks[0]) for name, angle in angles.items())
-
-
-def test_a_joint_that_follows_a_locked_one_goes_with_it(tmp_path):
-    """The URDF's multiplier −1 and offset 0.1."""
-    found = load_robot(beside(tmp_path, knuckled(), "lock = {finger_joint = 0.3}\n"))
-    followers = [
-        f"{side}_joint" for side in ("left_knuckle", "left_tip", "right_knuckle", "right_tip")
-    ]
-    angles = {"finger_joint": 0.3, **dict.fromkeys(followers, -0.2)}
-    agrees_with_pinocchio(knuckled(), found, angles)
-
-
-def test_a_joint_of_the_arm_may_be_locked(tmp_path):
-    """A torso that the arm stands on, held."""
-    text = robot(link("base"), arm(7))
-    found = load_robot(beside(tmp_path, text, "lock = {joint1 = 0.4}\n"))
-    assert found.chain.names == tuple(f"joint{k}" for k in range(2, 8))
-    agrees_with_pinocchio(text, found, {"joint1": 0.4})
 
 
 @pytest.mark.parametrize(

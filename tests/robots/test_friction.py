@@ -69,12 +69,7 @@ def test_friction_at_half_a_radian_a_second_under_a_load(friction, expected):
     torque = friction_torque((friction,), dq, load)
     np.testing.assert_allclose(torque[:, 0], [expected, -expected, 0.0], rtol=1e-9)
     if friction.model != "none":
-        off = JointFriction(
-            model=friction.model,
-            parameters={**friction.parameters, "offset": 0.2},
-            speeds=friction.speeds,
-            torques=friction.torques,
-        )
+        off = replace(friction, parameters={**friction.parameters, "offset": 0.2})
         np.testing.assert_allclose(friction_torque((off,), dq, load), torque + 0.2, rtol=1e-12)
 
 
@@ -221,12 +216,8 @@ def test_all_but_the_offset_follows_the_law_of_the_joint_s_size(size):
     """At 28 and 45 °C; where no temperature is measured, and at 35 °C, it is the reference's."""
     law, cold, hot = LAWS[size]
     values = {"coulomb": 2.0, "viscous": 1.0, "presliding": 1.0, "presliding_length": 1e-3}
-    warm = JointFriction(
-        model="coulomb-viscous-offset",
-        parameters=values | {"offset": 0.5},
-        temperature=law,
-        temperature_at=35.0,
-    )
+    warm = joint("coulomb-viscous-offset", **values, offset=0.5)
+    warm = replace(warm, temperature=law, temperature_at=35.0)
     T = np.array([[28.0], [45.0], [35.0], [np.nan]])
     one = np.ones((4, 1))
     torque = friction_torque((warm,), 0.5 * one, deflection=one, temperature=T)
@@ -269,17 +260,9 @@ def test_they_are_read_and_written_back(tmp_path):
     """Presliding and temperature stand beside any model."""
     robot = load_robot(arm_with(POINTS, tmp_path))
     values = {"load_coulomb": 0.067, "smoothing": 0.003, "offset": -0.2}
-    giving = {"presliding": 2.0, "presliding_length": 3e-4}
-    law = (3.637679, -0.011074, 1.362321, -0.085741)
-    expected = JointFriction(
-        model="points",
-        parameters=values | giving,
-        speeds=SPEEDS,
-        torques=TORQUES,
-        temperature=law,
-        temperature_at=44.6,
-    )
-    assert robot.friction[0] == expected
+    expected = points(**values, presliding=2.0, presliding_length=3e-4)
+    law = LAWS["3 e"][0]
+    assert robot.friction[0] == replace(expected, temperature=law, temperature_at=44.6)
     again = tmp_path / "again.toml"
     again.write_text(robot_toml(robot), encoding="utf-8")
     assert load_robot(again).friction == robot.friction
@@ -335,8 +318,7 @@ def test_a_joint_that_turns_back_gives_before_it_slides():
     It is the sign of a long motion, and holds at rest; the joint beside has none.
     """
     values = {"coulomb": 0.0, "viscous": 0.0, "presliding": 2.5, "presliding_length": 3e-4}
-    giving = JointFriction(model="coulomb-viscous", parameters=values)
-    friction = RunningFriction((giving, JointFriction()))
+    friction = RunningFriction((joint("coulomb-viscous", **values), JointFriction()))
     q = 3e-4 * np.array([0.0, 0.5, 1.0, 3.0, 2.5, 1.0, 1.0, 0.0])[:, None].repeat(2, axis=1)
     torque = friction.torque(q, np.zeros_like(q))
     expected = 2.5 * np.array([0.0, 0.5, 1.0, 1.0, 0.5, -1.0, -1.0, -1.0])
@@ -355,15 +337,8 @@ def test_the_terms_take_off_friction_by_load_temperature_and_what_was_before():
     log = Recording(t=t, q=q, dq=dq, current=np.zeros_like(q), temperature=T)
     values = {"coulomb": 2.0, "viscous": 1.0, "load_coulomb": 0.1, "presliding": 2.5}
     lengths = 1e-4 * np.arange(1.0, 7.0)
-    friction = tuple(
-        JointFriction(
-            model="coulomb-viscous-load",
-            parameters={**values, "presliding_length": length},
-            temperature=(0.402, -0.09083, 0.9553, -0.01831),
-            temperature_at=35.0,
-        )
-        for length in lengths
-    )
+    each = [joint("coulomb-viscous-load", **values, presliding_length=x) for x in lengths]
+    friction = tuple(replace(one, temperature=LAWS["1"][0], temperature_at=35.0) for one in each)
     rough = replace(robot, friction=friction)
     load = momentum_terms(robot.loaded_chain, q, dq).gravity
     state = play(q, lengths).state

@@ -49,15 +49,6 @@ def test_round_trips(angle: float, x: float, y: float, z: float) -> None:
     np.testing.assert_allclose(exp_matrix(vector), pin.exp3(vector), atol=ROUNDING)
 
 
-@given(SEEDS)
-def test_the_logarithm_is_pinocchio_s(seed: int) -> None:
-    """It replaced a loop over ``pin.log3`` in the simulator's logs."""
-    turns = Rotation.random(20, rng=np.random.default_rng(seed)).as_matrix()
-    expected = np.array([pin.log3(R) for R in turns])
-    # log3 loses digits near π as the root of the trace does
-    np.testing.assert_allclose(log_matrix(turns), expected, atol=1e-7)
-
-
 def test_product_is_that_of_matrices() -> None:
     a, b = np.random.default_rng(2).normal(0.0, 1.0, (2, 50, 3))
     vector = log_quaternion(quaternion_product(exp_quaternion(a), exp_quaternion(b)))

@@ -140,13 +140,6 @@ def test_stick_and_slide_agree_with_least_squares_in_bounds(seed: int) -> None:
     np.testing.assert_allclose(friction[sliding], (limit * np.sign(after))[sliding], atol=1e-8)
 
 
-@pytest.mark.parametrize("step", [0.0, -1e-3, 2e-3])
-def test_step_outside_the_range_is_refused(step: float) -> None:
-    robot = load_robot("ur5")
-    with pytest.raises(ParameterError, match=r"at most 0\.001 s"):
-        Plant(robot.model, frictionless(robot), np.zeros(6), np.zeros(6), step)
-
-
 @pytest.mark.slow
 def test_follows_another_engine(logs: Path) -> None:
     """Driven by the torque and wrench MuJoCo logged, q stays with MuJoCo's over 0.2 s."""
@@ -281,13 +274,6 @@ def test_presliding_is_the_models_and_a_share_of_the_coulomb_torque():
     np.testing.assert_allclose(part.presliding, 0.6 * whole.coulomb)
     np.testing.assert_allclose(part.coulomb + part.presliding, whole.coulomb)
     np.testing.assert_array_equal(part.presliding_length, 3e-4)
-
-
-def test_a_frictionless_arm_has_none():
-    friction = true_friction(load_robot("panda"), FrictionSpec(enabled=False))
-    torque, slope = friction.smooth(np.ones(7))
-    assert not np.any([torque, slope, friction.dry(np.ones(7))])
-    assert "amplitude" not in friction.present
 
 
 def test_an_arm_without_friction_figures_has_those_stated():

@@ -108,12 +108,6 @@ def test_two_runs_do_not_write_one_copy(tmp_path: Path) -> None:
         second.__enter__()
 
 
-def test_a_run_that_did_nothing_leaves_nothing(tmp_path: Path) -> None:
-    with pytest.raises(KeyboardInterrupt), unfinished(tmp_path / "copy", "key"):
-        raise KeyboardInterrupt
-    assert not any(tmp_path.iterdir())
-
-
 def test_rows_are_whole_or_not_there(tmp_path: Path) -> None:
     put_rows(tmp_path / "rows.npz", reported=np.array("{}"), a=np.ones(2))
     held = stored_rows(tmp_path / "rows.npz")
