@@ -7,11 +7,9 @@ import numpy as np
 import pytest
 
 from vftcli.batch.annotation import ForceChoice, by_row, check_signals, force_columns
-from vftcli.batch.log_work import options_digest
 from vftcli.observers import ObserverChoice
 from vftcli.readers.reader import ALL, ReadChoice
 from vftcli.readers.reading import read, read_chosen
-from vftcli.robots import RobotChoice
 from vftcli.signals.errors import LogError, ParameterError
 from vftcli.signals.recording import Recording
 from vftcli.wrench import WrenchChoice, ZeroChoice
@@ -62,18 +60,6 @@ def test_the_columns_and_what_they_say_of_themselves() -> None:
     left = replace(asked, read=ReadChoice(arm="left"))
     (torque, *_) = force_columns(left, ["j"], derived=False, valid=False)
     assert torque.name == "external_torque_left"
-
-
-def test_the_key_is_what_the_numbers_depend_on(tmp_path: Path) -> None:
-    """Also the contents of the robot's file."""
-    arms = []
-    for text in ("x = 1", "x = 2"):
-        (file := tmp_path / text / "arm.toml").parent.mkdir()
-        file.write_text(text)
-        arms.append(ForceChoice(robot=RobotChoice(name=str(file))))
-    others = (ForceChoice(sd=True), ForceChoice(observers=ObserverChoice(names=("gmo",))))
-    assert options_digest(ForceChoice()) == options_digest(ForceChoice())
-    assert len({*map(options_digest, (ForceChoice(), *arms, *others))}) == 5
 
 
 def test_an_effort_that_was_not_measured_on_half_of_the_joints_is_refused() -> None:

@@ -3,7 +3,7 @@
 import numpy as np
 import polars as pl
 import pytest
-from seed_logs import headerless_csv, matrix_npy, motion, parquet, table_csv
+from seed_logs import headerless_csv, motion, parquet, table_csv
 
 from vftcli.readers.columns import parse_columns
 from vftcli.readers.reader import ReadChoice
@@ -27,14 +27,6 @@ def test_one_joint_of_several_is_turned(path):
     ):
         with pytest.raises(LogError, match=words):
             read(path, columns=columns)
-
-
-def test_minus_turns_the_sign_and_is_said(path):
-    plain = read(matrix_npy(path), columns="t,q:6,dq:6,current:6")
-    turned = read(path, columns="t,q:6,_:6,-current:6")
-    np.testing.assert_array_equal(turned.current, -plain.current)
-    assert turned.dq is None
-    assert "turned the sign of current (--columns)" in turned.source.repairs
 
 
 UNITS = {
@@ -91,13 +83,6 @@ def test_slices_of_list_columns(path):
     recording = read(path, columns="t=timestamp,q=observation.state[0:3],dq=dq[1:4]")
     np.testing.assert_array_equal(recording.q, log["q"][:, :3])
     np.testing.assert_array_equal(recording.dq, log["dq"][:, 1:4])
-
-
-def test_a_table_without_clock_takes_a_rate(path):
-    path.write_text("".join(f"{0.1 * k},{k}\n" for k in range(5)))
-    recording = read(path, columns="t@125Hz,q,current")
-    np.testing.assert_allclose(recording.t, np.arange(5) / 125, rtol=1e-15)
-    assert "125 Hz as stated" in recording.source.clock
 
 
 def test_one_of_several_recordings(path):

@@ -118,7 +118,11 @@ def test_gaps_and_jitter(path):
 @pytest.mark.parametrize(
     ("column", "values", "word"),
     [
-        ("t", np.where(np.arange(300) == 150, 0.5, np.arange(300) / 100), "runs backwards 1×"),
+        (
+            "t",
+            np.where(np.arange(300) == 150, 0.5, np.arange(300) / 100),
+            "runs backwards 1×, first at sample 151 ",
+        ),
         ("q/1", np.where(np.arange(300) == 150, np.nan, 0.3), "nan in sample 151"),
         # what the last tenth says counts
         ("q/1", np.r_[np.full(270, 0.3), np.linspace(0.3, 90.0, 30)], "looks like degrees"),

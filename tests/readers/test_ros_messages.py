@@ -8,7 +8,7 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from vftcli.readers.bags.decode import long_name
 from vftcli.signals.errors import OutputError
-from vftcli.simulation.writers.rosbag2 import in_parts, schema_text, serialised, stamped
+from vftcli.simulation.writers.rosbag2 import schema_text, serialised, stamped
 
 STORE = get_typestore(Stores.ROS2_HUMBLE)
 TIMES = np.array([0, 1_700_000_000_123_456_789, 4_000_000_000], dtype=np.int64)
@@ -45,19 +45,6 @@ def test_joint_states_are_the_bytes_that_rosbags_writes(names, joints, frame, se
         message = kind(header=header(time, frame), name=names, **columns)
         expected = bytes(STORE.serialize_cdr(message, "sensor_msgs/msg/JointState"))
         assert found[k].tobytes() == expected
-
-
-def test_parts_and_constants_go_to_their_fields():
-    force, torque = np.random.default_rng(0).normal(size=(2, 3, 3))
-    values = {**stamped(TIMES), "header.frame_id": "tool"}
-    values |= in_parts("wrench.force", "xyz", force) | in_parts("wrench.torque", "xyz", torque)
-    found = serialised("geometry_msgs/WrenchStamped", values, 3)
-    message = STORE.deserialize_cdr(found[2].tobytes(), "geometry_msgs/msg/WrenchStamped")
-    assert message.header.stamp.sec == 4
-    assert message.wrench.force.y == force[2, 1]
-    assert message.wrench.torque.z == torque[2, 2]
-    constant = serialised("geometry_msgs/Vector3", {"y": 2.5}, 4)
-    assert STORE.deserialize_cdr(constant[3].tobytes(), "geometry_msgs/msg/Vector3").y == 2.5
 
 
 def test_a_field_that_is_not_there_is_refused():

@@ -249,14 +249,6 @@ def test_a_bad_cell_in_the_middle_is_refused_with_its_place(path, row, reported)
         written(path, table(lines))
 
 
-def test_time_that_runs_backwards_is_refused(path):
-    lines = rows()
-    lines[10], lines[11] = lines[11], lines[10]
-    said = r"runs backwards 1×, first at sample 12 \(from 0\.110000 to 0\.100000 s\)"
-    with pytest.raises(ClockError, match=said):
-        written(path, table(lines))
-
-
 @pytest.mark.parametrize(
     ("content", "reported"),
     [

@@ -27,9 +27,3 @@ def test_a_package_that_lacks_another_is_not_called_missing(monkeypatch):
     monkeypatch.setattr(place, lambda _: __import__("no_such_module"))
     with pytest.raises(PackageError, match=f"cannot be loaded {words}"):
         needed("rerun", "a thing")
-
-
-def test_one_that_is_there_is_handed_over() -> None:
-    assert installed("rerun")
-    check_installed("rerun", "a thing")
-    assert needed("rerun.time", "a thing") is sys.modules["rerun.time"]

@@ -16,9 +16,6 @@ from vftcli.simulation.plant import true_friction
 from vftcli.simulation.scenario import MismatchSpec, ServoSpec
 from vftcli.simulation.trajectories import Reference
 
-# The position controller against Pinocchio and the linear loop it makes
-
-
 ROBOT = load_robot("ur5")
 RNG = np.random.default_rng(0)
 STATES = Reference(*RNG.uniform(-0.5, 0.5, (3, 4, 6)))
@@ -55,41 +52,16 @@ def test_torque_stays_inside_the_limits():
     assert np.all(np.isinf(free.limit))
 
 
-@pytest.mark.parametrize(
-    ("spec", "words"),
-    [
-        (ServoSpec(stiffness="hard"), "there is stiff, soft"),
-        (ServoSpec(stiffness=0.0), "must be positive"),
-        (ServoSpec(damping=-0.1), "must be positive and damping not negative"),
-        (ServoSpec(stiffness=401.0), "chatters at a step of 0.001 s; it can be at most 400"),
-    ],
-)
-def test_impossible_loops_are_refused(spec, words):
-    with pytest.raises(ParameterError, match=words):
-        Servo(spec, ROBOT, 1e-3)
-    Servo(ServoSpec(stiffness=399.0), ROBOT, 1e-3)
-
-
 # The arm that is drawn: how far it lies from its profile, and what leaves it alone
-
-
-UR5 = load_robot("ur5")
 
 
 def arm(*settings):
     """The arm of a UR5 scenario with these settings."""
-    return build_arm(load_scenario("ur5-circle", settings), UR5, np.random.default_rng(1))
+    return build_arm(load_scenario("ur5-circle", settings), ROBOT, np.random.default_rng(1))
 
 
-SIZES = {
-    "mass": 0.05,
-    "com": 0.004,
-    "rotor_inertia": 0.1,
-    "friction": 0.2,
-    "torque_constant": 0.03,
-    "torque_offset": 0.5,
-    "payload": 0.06,
-}
+SIZES = {"mass": 0.05, "com": 0.004, "rotor_inertia": 0.1, "friction": 0.2}
+SIZES |= {"torque_constant": 0.03, "torque_offset": 0.5, "payload": 0.06}
 MORE = [
     "payload={mass=2.0, com=[0.01, 0.02, 0.03], inertia=[0.01, 0.02, 0.03]}",
     "force_sensor={mass=0.35, com=[0.0, 0.01, 0.03]}",
@@ -121,15 +93,15 @@ def test_an_arm_is_its_profile_with_what_the_seed_draws(off):
     gain, offset = 1.0 + draw("torque_constant", 6), draw("torque_offset", 6)
     scale = 1.0 + draw("payload", 1)[0]
     links = replace(
-        UR5.chain,
-        mass=UR5.chain.mass * mass,
-        com=UR5.chain.com + com,
-        inertia=UR5.chain.inertia * mass[:, None, None],
-        rotor_inertia=UR5.chain.rotor_inertia * rotor,
+        ROBOT.chain,
+        mass=ROBOT.chain.mass * mass,
+        com=ROBOT.chain.com + com,
+        inertia=ROBOT.chain.inertia * mass[:, None, None],
+        rotor_inertia=ROBOT.chain.rotor_inertia * rotor,
     )
     same(drawn.chain, links.with_payload(load(scale)).with_payload(SENSOR))
-    same(drawn.nominal.chain, UR5.chain)
-    own = true_friction(UR5, load_scenario("ur5-circle").friction)
+    same(drawn.nominal.chain, ROBOT.chain)
+    own = true_friction(ROBOT, load_scenario("ur5-circle").friction)
     for name, factor in (("coulomb", dry), ("presliding", dry), ("bend_slopes", wet)):
         moved, profile = getattr(drawn.friction, name), getattr(own, name)
         np.testing.assert_allclose(moved, profile * factor, rtol=1e-12)
@@ -148,7 +120,7 @@ def same(chain, other):
 def test_a_controller_knows_payload_and_sensor_if_it_is_told_to():
     """Their stated masses, not the drawn one."""
     drawn = arm(*MORE, "payload.known=true", "force_sensor.known=true", "mismatch.payload=0.4")
-    same(drawn.nominal.chain, UR5.chain.with_payload(load(1.0)).with_payload(SENSOR))
+    same(drawn.nominal.chain, ROBOT.chain.with_payload(load(1.0)).with_payload(SENSOR))
     assert drawn.nominal.payload is None
 
 

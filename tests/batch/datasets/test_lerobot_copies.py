@@ -40,28 +40,8 @@ def statistics(episodes: Any) -> dict[int, dict[str, Any]]:
     return {k: {name: statistics_of(x) for name, x in own.items()} for k, own in made}
 
 
-def test_the_other_columns_the_rows_and_their_groups_stay(tmp_path: Path) -> None:
-    dataset = LeRobotDataset(FIXTURE)
-    for file in dataset.files():
-        source, target = FIXTURE / file.place, tmp_path / file.place.name
-        own = forces(file.episodes)
-        dataset.write(file, COLUMNS, own, target)
-        before, after = pq.read_table(source), pq.read_table(target)
-        assert after.select(before.column_names).equals(before)
-        assert after.column_names[-2:] == [ADDED, "observation.valid"]
-        kind = str(after.schema.field(ADDED).type)
-        assert kind == "fixed_size_list<element: float>[7]"
-        written = np.array(after.column(ADDED).to_pylist(), np.float32)
-        given = [own[k]["external_torque"] for k in file.episodes]
-        np.testing.assert_array_equal(written, np.concatenate(given))
-        assert pq.ParquetFile(target).num_row_groups == pq.ParquetFile(source).num_row_groups
-        reported = json.loads(after.schema.metadata[b"huggingface"])["info"]["features"]
-        assert list(reported) == after.column_names
-        assert reported[ADDED]["length"] == 7
-
-
 @pytest.mark.parametrize("codec", ["none", "snappy", "zstd"])
-def test_compression_row_groups_and_rows_in_any_order_are_kept(
+def test_the_other_columns_rows_in_any_order_their_groups_and_packing_stay(
     codec: str, tmp_path: Path
 ) -> None:
     """An episode's rows may stand apart: its values go to its own rows, in their order."""
@@ -79,9 +59,16 @@ def test_compression_row_groups_and_rows_in_any_order_are_kept(
     assert made.num_row_groups == 8
     packed = [made.metadata.row_group(k).column(0).compression.lower() for k in range(8)]
     assert packed == ["uncompressed" if codec == "none" else codec] * 8
-    written = np.array(made.read().column(ADDED).to_pylist(), np.float32)
+    after = made.read()
+    written = np.array(after.column(ADDED).to_pylist(), np.float32)
     np.testing.assert_array_equal(written[:160], own[1]["external_torque"])
     np.testing.assert_array_equal(written[160:], own[0]["external_torque"])
+    assert after.select(table.column_names).equals(turned)
+    assert after.column_names[-2:] == [ADDED, "observation.valid"]
+    assert str(after.schema.field(ADDED).type) == "fixed_size_list<element: float>[7]"
+    reported = json.loads(after.schema.metadata[b"huggingface"])["info"]["features"]
+    assert list(reported) == after.column_names
+    assert reported[ADDED]["length"] == 7
 
 
 def test_what_was_edited_in_between_is_refused(tmp_path: Path) -> None:
