@@ -115,15 +115,14 @@ def test_gaps_and_jitter(path):
     assert [remark.values["gaps"] for remark in long.source.remarks] == [3]
 
 
+K = np.arange(300)
+
+
 @pytest.mark.parametrize(
     ("column", "values", "word"),
     [
-        (
-            "t",
-            np.where(np.arange(300) == 150, 0.5, np.arange(300) / 100),
-            "runs backwards 1×, first at sample 151 ",
-        ),
-        ("q/1", np.where(np.arange(300) == 150, np.nan, 0.3), "nan in sample 151"),
+        ("t", np.where(K == 150, 0.5, K / 100), "runs backwards 1×, first at sample 151 "),
+        ("q/1", np.where(K == 150, np.nan, 0.3), "nan in sample 151"),
         # what the last tenth says counts
         ("q/1", np.r_[np.full(270, 0.3), np.linspace(0.3, 90.0, 30)], "looks like degrees"),
         ("t", np.r_[np.arange(270), np.arange(30)] / 100, "the clock restarts 1×"),
