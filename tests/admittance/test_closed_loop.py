@@ -42,18 +42,12 @@ def observer(robot: str, convention: str) -> KalmanObserver:
 
 
 def run(
-    name: str,
-    convention: str,
-    *assignments: str,
-    seed: int = 1,
-    duration: float = 0.0,
-    torque: str = "average",
-    zero: tuple[float, float] = (0.5, 3.0),
+    name, convention, *, seed=1, duration=0.0, torque="average", zero=(0.5, 3.0)
 ) -> ClosedLoop:
     """A scenario against the profile's variable controller."""
     scenario = replace(load_scenario(name, ()), duration=duration)
     robot = load_robot(scenario.robot)
-    p = from_table(robot.admittance, robot.name, parse_settings(assignments))
+    p = from_table(robot.admittance, robot.name, {})
     kalman = observer(robot.name, convention)
     return run_closed_loop(scenario, variable(p), kalman, seed=seed, torque=torque, zero=zero)
 
@@ -89,9 +83,7 @@ def test_latency_of_the_first_drag(convention):
     assert entry.detection < entry.motion
 
 
-def pushed(
-    torque: str, duration: float = 0.4, zero: tuple[float, float] | None = (0.05, 0.1)
-) -> ClosedLoop:
+def pushed(torque, duration=0.4, zero=(0.05, 0.1)) -> ClosedLoop:
     """Four tenths of a second in which 40 N along −y come on from .15 to .25 s."""
     push = ProfileSpec(name="push", spans=((0.15, 0.9),), force=(0.0, -40.0, 0.0), rise=0.1)
     scenario = replace(load_scenario("ur5-drag", ()), contacts=(push,), duration=duration)

@@ -6,34 +6,19 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from vftcli.admittance import ControlChoice
-from vftcli.admittance.law import (
-    AXES,
-    Admittance,
-    UnstableError,
-    check_stable,
-    controllers,
-    discrete_number,
-    energy,
-    escape_factor,
-    from_table,
-    parse_settings,
-    printed_energy,
-    traditional,
-    variable,
-)
+from vftcli.admittance import ControlChoice, law, released_robot
 from vftcli.admittance.motion import AxisMotion, release, run
 from vftcli.admittance.replay import release_deviation
-from vftcli.robots import PROFILES, load_robot
-from vftcli.signals.errors import ParameterError
+from vftcli.robots import PROFILES, RobotChoice, load_robot
+from vftcli.signals.errors import ParameterError, RobotError
 
 
-def of_profile(robot: str = "ur5", *assignments: str) -> Admittance:
+def of_profile(robot: str = "ur5", *assignments: str) -> law.Admittance:
     """A profile's parameters with assignments."""
-    return from_table(load_robot(robot).admittance, robot, parse_settings(assignments))
+    return law.from_table(load_robot(robot).admittance, robot, law.parse_settings(assignments))
 
 
-UR5 = of_profile()
+ROBOT, UR5 = load_robot("ur5"), of_profile()
 
 
 def returned(motion: AxisMotion, n: int, share: float, axis: int = 0) -> float:
@@ -48,7 +33,7 @@ def test_constant_parameters_reproduce_the_second_order_response():
     damped = omega * np.sqrt(1.0 - zeta**2)
     errors = []
     for period in (0.008, 0.004, 0.002):
-        motion = release([traditional(replace(UR5, period=period))], start(0.3), 5.0)
+        motion = release([law.traditional(replace(UR5, period=period))], start(0.3), 5.0)
         t = motion.t
         wave = np.cos(damped * t) + zeta * omega / damped * np.sin(damped * t)
         exact = 0.3 * np.exp(-zeta * omega * t) * wave
@@ -67,7 +52,7 @@ def test_constant_force_settles_at_force_over_stiffness():
     force = np.zeros((4000, 6))
     force[:, 1] = 4.0
     dragged = force != 0.0
-    motion = run([traditional(UR5), variable(UR5)], force, dragged)
+    motion = run([law.traditional(UR5), law.variable(UR5)], force, dragged)
     # 32 s are 27 time constants of 2M/B = 1.2 s: e^{-27} of 0.5 m is left
     np.testing.assert_allclose(motion.x[-1, :, 1], 0.5, atol=1e-9)
     np.testing.assert_array_equal(motion.x[:, 0], motion.x[:, 1])  # the drag phase is the same
@@ -82,7 +67,7 @@ EXPECTED = [
 
 @pytest.mark.parametrize(("xi", "figures"), EXPECTED)
 def test_release_figures_of_the_ur5(xi, figures):
-    found = controllers(replace(UR5, xi=xi), alphas=(1.0, 1.3, 1.6, 1.9))
+    found = law.controllers(replace(UR5, xi=xi), alphas=(1.0, 1.3, 1.6, 1.9))
     motion = release(found, start(0.3), 12.0)
     for n, (time, over) in enumerate(figures):
         assert returned(motion, n, 0.02) == pytest.approx(time, rel=0.03)  # the issue's tolerance
@@ -91,7 +76,7 @@ def test_release_figures_of_the_ur5(xi, figures):
 
 
 def test_release_figures_of_the_panda():
-    motion = release(controllers(of_profile("panda")), start(0.2), 60.0)
+    motion = release(law.controllers(of_profile("panda")), start(0.2), 60.0)
     found = [[returned(motion, n, share) for n in (0, 1)] for share in (0.10, 0.02)]
     np.testing.assert_allclose(found, [[22.6, 3.6], [38.1, 6.2]], rtol=0.03)
 
@@ -104,7 +89,7 @@ def random_controllers(count: int, limit: float, rng: np.random.Generator) -> tu
         alpha, xi = rng.uniform(0.5, 3.0, 6), rng.uniform(0.3, 3.0, 6)
         for row in (mass, stiffness, alpha, xi):
             row[3:] = row[3]
-        p = Admittance(
+        p = law.Admittance(
             mass=mass,
             damping=np.ones(6),
             stiffness=stiffness,
@@ -118,7 +103,7 @@ def random_controllers(count: int, limit: float, rng: np.random.Generator) -> tu
         x = rng.uniform(-1.0, 1.0, 6) * bound
         axis = rng.standard_normal(3)
         x[3:] = axis / np.linalg.norm(axis) * min(rng.uniform() * bound[3], 3.0)
-        found.append(variable(p))
+        found.append(law.variable(p))
         starts.append(x)
     return found, starts
 
@@ -132,19 +117,21 @@ def test_printed_v_rises_and_w_does_not(limit):
     assert not np.any(motion.escaped)
     risen = 0
     for n, controller in enumerate(found):
-        W = energy(controller, motion.x[:, n], motion.v[:, n])
+        W = law.energy(controller, motion.x[:, n], motion.v[:, n])
         sums = np.column_stack([W[:, :3], W[:, 3:].sum(axis=1)])
         assert np.max(np.diff(sums, axis=0) / sums[0]) <= 1e-12  # the issue's number
-        V = printed_energy(controller, motion.x[:, n], motion.v[:, n])[:, :3]
+        V = law.printed_energy(controller, motion.x[:, n], motion.v[:, n])[:, :3]
         risen += bool(np.any(V.max(axis=0) > 1.001 * V[0]))
     assert risen == 1000
 
 
 def test_printed_v_of_the_paper_s_release():
     """0.684 → 1.099 J from 0.3 m at α = 1.9 as Ts → 0 (science of the issue)."""
-    controller = variable(replace(UR5, alpha=np.full(6, 1.9), period=1e-4, speed_limit=np.inf))
+    controller = law.variable(
+        replace(UR5, alpha=np.full(6, 1.9), period=1e-4, speed_limit=np.inf)
+    )
     motion = release([controller], start(0.3), 2.0)
-    V = printed_energy(controller, motion.x[:, 0], motion.v[:, 0])[:, 0]
+    V = law.printed_energy(controller, motion.x[:, 0], motion.v[:, 0])[:, 0]
     assert V[0] == pytest.approx(0.684, abs=5e-4)  # printed digits
     assert V.max() == pytest.approx(1.099, abs=2e-3)  # Ts = 0.1 ms is not 0 yet: O(Ts)
 
@@ -153,8 +140,8 @@ def test_printed_v_of_the_paper_s_release():
 def test_escape_beyond_the_bound_without_a_limit_and_none_with_one():
     """UR5 rotation at α = 1.6: 0.495/1.6 rad is the last release that returns."""
     bound = 0.495 / 1.6
-    free = variable(replace(UR5, speed_limit=np.inf, period=2e-4))
-    limited = variable(replace(UR5, period=1e-3))
+    free = law.variable(replace(UR5, speed_limit=np.inf, period=2e-4))
+    limited = law.variable(replace(UR5, period=1e-3))
     inside = release([free], start(0.97 * bound, 3), 3.0)  # 3 %: Ts and the printed bound
     beyond = release([free], start(1.03 * bound, 3), 3.0)
     held = release([limited], start(0.5, 3), 6.0)
@@ -169,14 +156,14 @@ def test_escape_beyond_the_bound_without_a_limit_and_none_with_one():
 def test_at_small_speed_the_energy_is_that_of_a_mass(scale):
     """½M_d v²/α² whatever v₀ is: φ(|v|/v₀)·v₀² → ½v²; the next term is v/v₀ ≤ 2e-6 of it."""
     p = replace(UR5, speed_scale=scale)
-    controller, v = variable(p), np.full(6, 1e-6)
-    found = energy(controller, np.zeros(6), v)
+    controller, v = law.variable(p), np.full(6, 1e-6)
+    found = law.energy(controller, np.zeros(6), v)
     expected = 0.5 * np.asarray(p.mass) * v**2 / np.asarray(p.alpha) ** 2
     np.testing.assert_allclose(found, expected, rtol=1e-5)
     # The printed one has the variable mass M_d/α there, and at rest the stiffness α K_d.
-    alpha, slow = np.asarray(p.alpha), printed_energy(controller, np.zeros(6), v)
+    alpha, slow = np.asarray(p.alpha), law.printed_energy(controller, np.zeros(6), v)
     np.testing.assert_allclose(slow, alpha * expected, rtol=1e-5)
-    bent = printed_energy(controller, np.full(6, 0.1), np.zeros(6))
+    bent = law.printed_energy(controller, np.full(6, 0.1), np.zeros(6))
     np.testing.assert_allclose(bent, 0.5 * alpha * np.asarray(p.stiffness) * 0.01, rtol=1e-12)
 
 
@@ -184,7 +171,7 @@ def test_controllers_run_side_by_side_as_alone():
     rng = np.random.default_rng(3)
     force = rng.normal(0.0, 10.0, (300, 6)) * np.repeat([1.0, 0.3], 3)
     dragged = np.abs(force) > np.repeat([8.0, 2.0], 3)
-    found = controllers(UR5, alphas=(1.0, 1.9))
+    found = law.controllers(UR5, alphas=(1.0, 1.9))
     together = run(found, np.where(dragged, force, 0.0), dragged)
     for n, controller in enumerate(found):
         alone = run([controller], np.where(dragged, force, 0.0), dragged)
@@ -204,7 +191,7 @@ def test_discrete_condition_is_the_eigenvalues():
         mass, damping, stiffness = rng.uniform(0.1, 10.0, 3)
         damping *= 50.0 * rng.uniform()
         period = rng.uniform(1e-3, 0.5)
-        number = float(discrete_number(*map(np.asarray, (mass, damping, stiffness)), period))
+        number = float(law.discrete_number(*map(np.asarray, (mass, damping, stiffness)), period))
         if abs(number - 4.0) > 1e-6:  # on the border the radius is 1 to rounding
             assert (spectral_radius(mass, damping, stiffness, period) < 1.0) == (number < 4.0)
 
@@ -233,48 +220,52 @@ def escapes(xi: float, y: float) -> bool:
 @pytest.mark.slow
 @pytest.mark.parametrize("xi", [0.0, 0.510, 0.671, 1.0, 1.0607, 2.7386])
 def test_escape_factor_against_a_stiff_integrator(xi):
-    bound = escape_factor(xi)
+    bound = law.escape_factor(xi)
     assert not escapes(xi, bound * (1.0 - 1e-4))  # 1e-4: the integrator's own accuracy
     assert escapes(xi, bound * (1.0 + 1e-4))
 
 
 def test_escape_factors_of_the_science():
     """Printed to three digits; 2.653 printed for ξ = 2.74 is not confirmed by either method."""
-    found = [escape_factor(xi) for xi in (0.510, 0.671, 1.0, 1.0607)]
+    found = [law.escape_factor(xi) for xi in (0.510, 0.671, 1.0, 1.0607)]
     np.testing.assert_allclose(found, [1.006, 1.108, 1.321, 1.362], atol=8e-4)
-    assert escape_factor(0.0) == pytest.approx(1.0 / np.sqrt(2.0), rel=1e-9)  # W alone decides
-    assert escape_factor(120.0 / (2.0 * np.sqrt(480.0))) == pytest.approx(2.511, abs=1e-3)
-    ur5 = variable(replace(of_profile("ur5"), alpha=1.0))
+    assert law.escape_factor(0.0) == pytest.approx(
+        1.0 / np.sqrt(2.0), rel=1e-9
+    )  # W alone decides
+    assert law.escape_factor(120.0 / (2.0 * np.sqrt(480.0))) == pytest.approx(2.511, abs=1e-3)
+    ur5 = law.variable(replace(of_profile("ur5"), alpha=1.0))
     assert ur5.escape[[0, 3]] == pytest.approx([0.616, 0.495], abs=1e-3)
     # At the position's speed limit, two digits.
-    numbers = [variable(of_profile(name)).recovery[0] for name in ("ur5", "panda")]
+    numbers = [law.variable(of_profile(name)).recovery[0] for name in ("ur5", "panda")]
     assert numbers == pytest.approx([0.11, 0.22], abs=5e-3)
 
 
 @pytest.mark.parametrize("name", [name for name in PROFILES if load_robot(name).admittance])
 def test_every_profile_is_stable(name):
-    assert check_stable(controllers(of_profile(name))) == ()
+    assert law.check_stable(law.controllers(of_profile(name))) == ()
 
 
 def test_unstable_settings_are_refused_with_the_number():
     slow = of_profile("ur5", "period=0.5")
-    with pytest.raises(UnstableError, match=r"axis rx, drag phase: .* = 4\.25 must be below 4"):
-        check_stable(controllers(slow))
-    assert len(check_stable(controllers(slow), anyway=True)) > 1
+    with pytest.raises(
+        law.UnstableError, match=r"axis rx, drag phase: .* = 4\.25 must be below 4"
+    ):
+        law.check_stable(law.controllers(slow))
+    assert len(law.check_stable(law.controllers(slow), anyway=True)) > 1
     free = of_profile("ur5", "rotation.speed_limit=none")
-    with pytest.raises(UnstableError, match=r"axis rx has no speed limit.*beyond 0\.31 rad"):
-        check_stable(controllers(free))
-    check_stable([traditional(free)])  # constant parameters need no limit
+    with pytest.raises(law.UnstableError, match=r"axis rx has no speed limit.*beyond 0\.31 rad"):
+        law.check_stable(law.controllers(free))
+    law.check_stable([law.traditional(free)])  # constant parameters need no limit
 
 
 def test_a_release_is_excused_only_inside_the_escape_bound_of_its_axes():
     free = of_profile("ur5", "rotation.speed_limit=none")
     near, far = np.array([0, 0, 0, 0.3, 0, 0]), np.array([0, 0, 0, 0.3, 0.4, 0])
-    complaints = check_stable(controllers(free), release=near)
+    complaints = law.check_stable(law.controllers(free), release=near)
     assert {remark.code for remark in complaints} == {"law-escapes"}
     assert {remark.values["axis"] for remark in complaints} == {"rx", "ry", "rz"}
-    with pytest.raises(UnstableError, match=r"axis ry has no speed limit.*beyond 0\.31 rad"):
-        check_stable(controllers(free), release=far)
+    with pytest.raises(law.UnstableError, match=r"axis ry has no speed limit.*beyond 0\.31 rad"):
+        law.check_stable(law.controllers(free), release=far)
 
 
 def test_table_iii_and_iv():
@@ -346,27 +337,66 @@ def test_wrong_parameters_are_one_clear_line(assignment, words):
 
 def test_missing_section_names_what_is_missing():
     with pytest.raises(ParameterError, match="no admittance mass for x, y, z, rx, ry, rz"):
-        from_table({}, "mine", {})
+        law.from_table({}, "mine", {})
     partial = {"period": 0.01, "position": {"mass": 1.0}}
     with pytest.raises(ParameterError, match="no admittance mass for rx, ry, rz"):
-        from_table(partial, "mine", {})
+        law.from_table(partial, "mine", {})
 
 
 def test_controllers_of_a_comparison():
     p = of_profile("panda")
-    assert [c.name for c in controllers(p)] == ["traditional", "α = 6 / 3"]
-    assert [c.name for c in controllers(p, "variable", [1.0, 1.9])] == ["α = 1", "α = 1.9"]
+    assert [c.name for c in law.controllers(p)] == ["traditional", "α = 6 / 3"]
+    assert [c.name for c in law.controllers(p, "variable", [1.0, 1.9])] == ["α = 1", "α = 1.9"]
     with pytest.raises(ParameterError, match="alpha of axis x is 0"):
-        controllers(p, alphas=[0.0])
+        law.controllers(p, alphas=[0.0])
 
 
 def test_release_deviation():
     np.testing.assert_array_equal(release_deviation(["x=0.3,rz=-1"]), [0.3, 0, 0, 0, 0, -1])
     for text in ("q=1", "x", "x=much", "x=inf"):
-        with pytest.raises(ParameterError, match=f"axis of {', '.join(AXES)}"):
+        with pytest.raises(ParameterError, match=f"axis of {', '.join(law.AXES)}"):
             release_deviation([text])
     np.testing.assert_array_equal(release_deviation(["rx=3.14"])[3], 3.14)
     with pytest.raises(ParameterError, match="turns by 4 rad; it must be less than 10 m and π"):
         release_deviation(["rx=2.4,ry=-3.2"])
     with pytest.raises(ParameterError, match="moves by 9e"):
         release_deviation(["x=9e9"])
+
+
+def test_controllers_are_those_of_the_words():
+    words = {"controller": "variable", "xi": "0.8", "threshold_mode": "soft"}
+    settings = {f"admittance.{name}": value for name, value in words.items()}
+    found = ControlChoice.parsed(alpha="1,1.6", settings=settings).controllers(ROBOT)
+    assert [c.alpha[0] for c in found] == [1.0, 1.6]
+    np.testing.assert_array_equal(found[0].parameters.xi, np.full(6, 0.8))
+    assert found[0].parameters.threshold_mode == "soft"
+    assert len(ControlChoice.parsed().controllers(ROBOT)) == 2  # both kinds where none is named
+
+
+def test_as_printed_the_whole_force_enters_unless_a_mode_is_named():
+    def mode(*assignments: str) -> str:
+        choice = ControlChoice(assignments=assignments, as_printed=True)
+        return choice.controllers(ROBOT)[0].parameters.threshold_mode
+
+    assert mode() == "literal"
+    assert mode("admittance.threshold_mode=hard") == mode("threshold_mode=hard") == "hard"
+    assert ControlChoice.parsed().controllers(ROBOT)[0].parameters.threshold_mode == "hard"
+
+
+def test_a_release_starts_where_it_is_set_or_where_the_file_says():
+    named = ControlChoice.parsed(settings={"admittance.start": "0,1,2,3,4,5"})
+    np.testing.assert_array_equal(named.start_pose(ROBOT), [0, 1, 2, 3, 4, 5])
+    np.testing.assert_array_equal(ControlChoice().start_pose(ROBOT), ROBOT.admittance["start"])
+
+
+def test_a_slip_is_refused_before_a_log_is_read():
+    with pytest.raises(ParameterError, match="--alpha 'one' is not a list of numbers"):
+        ControlChoice.parsed(alpha="one")
+    with pytest.raises(ParameterError, match="there is traditional, variable"):
+        ControlChoice.parsed(settings={"admittance.controller": "fuzzy"})
+
+
+def test_a_release_needs_an_arm():
+    with pytest.raises(RobotError, match="a release needs an arm"):
+        released_robot(RobotChoice())
+    assert released_robot(RobotChoice(name="panda")).name == "panda"

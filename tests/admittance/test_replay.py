@@ -6,25 +6,9 @@ import numpy as np
 import polars as pl
 import pytest
 
-from vftcli.admittance.law import (
-    Admittance,
-    UnstableError,
-    controllers,
-    from_table,
-    parse_settings,
-)
+from vftcli.admittance import replay
+from vftcli.admittance.law import UnstableError, controllers, from_table, parse_settings
 from vftcli.admittance.motion import AxisMotion, Drag, JointPath, follow, largest_speed
-from vftcli.admittance.replay import (
-    Replay,
-    drag_remarks,
-    on_control_clock,
-    replay,
-    replay_release,
-    sensor_force,
-    stored_force,
-    trouble,
-    truth_force,
-)
 from vftcli.robots import load_robot
 from vftcli.robots.chain import flange_jacobian, link_poses
 from vftcli.robots.robot import FlangeSolver
@@ -61,14 +45,14 @@ def push(force: float = 24.0, axis: int = 1, length: float = 14.0) -> Force:
     return Wrench(name="push", t=t, values=wrench, frame="base"), np.tile(START, (len(t), 1))
 
 
-def run(force: Force, *assignments: str, alphas: tuple[float, ...] = ()) -> Replay:
+def run(force: Force, *assignments: str, alphas: tuple[float, ...] = ()) -> replay.Replay:
     """Replay on the UR5."""
     p = parameters(*assignments)
     source = fact("force-of-sensor", frame="a push")
-    return replay(*force, UR5, controllers(p, alphas=alphas), source=source)
+    return replay.replay(*force, UR5, controllers(p, alphas=alphas), source=source)
 
 
-def codes(found: Replay) -> set[str]:
+def codes(found: replay.Replay) -> set[str]:
     """The codes of what a replay has to say."""
     assert all(str(remark) for remark in found.remarks)  # the catalogue has words for each
     return {remark.code for remark in found.remarks}
@@ -191,9 +175,11 @@ def test_a_start_outside_the_limits_and_no_deviation_are_refused():
         run((record, q))
     p = parameters()
     with pytest.raises(ParameterError, match=r"the start pose has 5 joints; ur5 has 6"):
-        replay_release(np.array([0.3, 0, 0, 0, 0, 0]), UR5, controllers(p), start=np.zeros(5))
+        replay.replay_release(
+            np.array([0.3, 0, 0, 0, 0, 0]), UR5, controllers(p), start=np.zeros(5)
+        )
     with pytest.raises(ParameterError, match=r"--release x=0\.3"):
-        replay_release(np.zeros(6), UR5, controllers(p), start=START)
+        replay.replay_release(np.zeros(6), UR5, controllers(p), start=START)
 
 
 def test_a_log_that_is_nearly_all_gap_is_refused():
@@ -228,15 +214,15 @@ def test_w_never_rises_in_a_replay():
 def test_release_without_a_limit_inside_the_bound_is_let_pass():
     p = parameters("position.speed_limit=none")
     x = np.array([0.2, 0, 0, 0, 0, 0])
-    found = replay_release(x, UR5, controllers(p), start=START)
+    found = replay.replay_release(x, UR5, controllers(p), start=START)
     assert not np.any(found.motion.escaped)
     # Watched for six time constants of the slower, e⁻⁶ = .0025, or as long as you say.
     assert 1e-3 < np.max(np.abs(found.motion.x[-1, :, 0])) / 0.2 < 0.01
-    second = replay_release(x, UR5, controllers(p), start=START, duration=1.0)
+    second = replay.replay_release(x, UR5, controllers(p), start=START, duration=1.0)
     np.testing.assert_allclose(second.motion.t, 0.008 * np.arange(126), atol=1e-12)
     with pytest.raises(UnstableError, match=r"beyond 0\.385 m"):
-        replay_release(2.0 * x, UR5, controllers(p), start=START)
-    studied = replay_release(3.0 * x, UR5, controllers(p), start=START, anyway=True)
+        replay.replay_release(2.0 * x, UR5, controllers(p), start=START)
+    studied = replay.replay_release(3.0 * x, UR5, controllers(p), start=START, anyway=True)
     assert studied.motion.escaped[1]
     assert {"motion-escaped", "law-escapes"} <= codes(studied)
 
@@ -252,11 +238,11 @@ def test_a_force_that_is_not_known_counts_as_none_and_is_reported():
 
 def test_control_clock_takes_the_newest_sample():
     t = np.arange(41) * 0.001
-    clock, seen = on_control_clock(t, 0.0025)
+    clock, seen = replay.on_control_clock(t, 0.0025)
     np.testing.assert_allclose(clock, np.arange(17) * 0.0025, atol=1e-15)
     np.testing.assert_array_equal(seen, np.floor(np.arange(17) * 2.5 + 1e-9))
     printed = np.round(100.0 + np.arange(500) * 0.008, 6)  # a log's stamps, in step with control
-    _, kept = on_control_clock(printed - printed[0], 0.008)
+    _, kept = replay.on_control_clock(printed - printed[0], 0.008)
     np.testing.assert_array_equal(kept, np.arange(500))
 
 
@@ -276,29 +262,20 @@ def path_of(reached: np.ndarray | None = None, speed: float = 0.5) -> JointPath:
     return JointPath(q=np.zeros((ROWS, 2, 6)), reached=good, speed=np.array([speed, np.nan]))
 
 
-def replayed(
-    made: AxisMotion | None = None,
-    way: JointPath | None = None,
-    *,
-    parameters: Admittance = PARAMETERS,
-    **others: np.ndarray,
-) -> Replay:
+def replayed(made=None, way=None, *, parameters=PARAMETERS, **others) -> replay.Replay:
     """A replay without trouble, but for what is given."""
     zero = np.zeros((ROWS - 1, 6))
     given = {"start": zero[0], "wrench": zero, "drags": (), **others}
-    found = Replay(
-        robot=load_robot("ur5"),
-        controllers=controllers(parameters),
-        motion=made or motion_of(),
-        **given,
+    found = replay.Replay(
+        robot=UR5, controllers=controllers(parameters), motion=made or motion_of(), **given
     )
     vars(found).update(path=way or path_of())
     return found
 
 
 def test_nothing_is_said_of_a_replay_without_trouble():
-    assert not [*trouble(replayed())]
-    assert not [*trouble(replayed(logged=np.full((5, 6), 0.005)))]
+    assert not [*replay.trouble(replayed())]
+    assert not [*replay.trouble(replayed(logged=np.full((5, 6), 0.005)))]
 
 
 def test_each_limit_is_reported_with_its_number_and_its_controller():
@@ -307,7 +284,7 @@ def test_each_limit_is_reported_with_its_number_and_its_controller():
     limit = PARAMETERS.speed_limit
     v[3:6, 0, 2], v[5, 0, 3], v[7, 0, 3] = limit[2], -limit[3], 0.99 * limit[3]
     reached[30:40, 1] = False
-    found = [*trouble(replayed(motion_of(x, v), path_of(reached, 1.5)))]
+    found = [*replay.trouble(replayed(motion_of(x, v), path_of(reached, 1.5)))]
     assert "the first at 3.000 s" in " ".join(str(remark) for remark in found)
     reported = {(r.code, r.where.about): dict(r.values) for r in found}
     first, second = (controller.name for controller in TWO)
@@ -333,7 +310,7 @@ def test_travel_counts_where_poses_are_out_of_reach(mode, code):
     reached = np.ones((ROWS, 2), dtype=bool)
     reached[10, 1] = False
     parameters = replace(PARAMETERS, threshold_mode=mode)
-    _, remark = trouble(replayed(motion_of(x), path_of(reached), parameters=parameters))
+    _, remark = replay.trouble(replayed(motion_of(x), path_of(reached), parameters=parameters))
     assert remark.code == code
     assert remark.values["travel_m"] == pytest.approx(1.0)  # not the other controller's 9 m
 
@@ -342,11 +319,11 @@ def test_the_axis_nearest_to_its_threshold_is_named():
     wrench = np.zeros((10, 6))
     wrench[4, 0], wrench[5, 4] = -10.0, 0.75 * PARAMETERS.threshold[4]
     wrench[6] = np.nan
-    (remark,) = drag_remarks(replayed(wrench=wrench, logged=wrench))
+    (remark,) = replay.drag_remarks(replayed(wrench=wrench, logged=wrench))
     assert remark.values["axis"] == "ry"
     assert remark.values["share"] == pytest.approx(0.75)
-    assert not [*drag_remarks(replayed(wrench=wrench, logged=wrench, drags=[drag(4, 5)]))]
-    assert not [*drag_remarks(replayed(wrench=wrench[:0], logged=wrench))]
+    assert not [*replay.drag_remarks(replayed(wrench=wrench, logged=wrench, drags=[drag(4, 5)]))]
+    assert not [*replay.drag_remarks(replayed(wrench=wrench[:0], logged=wrench))]
 
 
 def drag(begin: int, release: int, axis: int = 2) -> Drag:
@@ -356,7 +333,7 @@ def drag(begin: int, release: int, axis: int = 2) -> Drag:
 def test_the_travel_of_a_log_that_moves_is_reported():
     logged = np.zeros((5, 6))
     logged[3, :3], logged[4, 3:] = [0.03, 0.0, 0.04], 1.0
-    (remark,) = trouble(replayed(logged=logged))
+    (remark,) = replay.trouble(replayed(logged=logged))
     assert remark.values["distance_m"] == pytest.approx(0.05)
 
 
@@ -374,26 +351,26 @@ def choice(**zero: object) -> WrenchChoice:
 def test_a_stored_torque_is_turned_into_its_wrench_and_zeroed():
     tau = np.einsum("tij,ti->tj", flange_jacobian(UR5.chain, POSES), LOADED)
     log = Recording(t=TIMES, q=POSES, tau_ext=tau)
-    found = stored_force(log, UR5, choice(spans=((0.0, 1.9),)), "kfo-fe")
+    found = replay.stored_force(log, UR5, choice(spans=((0.0, 1.9),)), "kfo-fe")
     expected = np.where(TIMES[:, None] > 2.0, 10.0, 0.0) * np.ones(6)
     np.testing.assert_allclose(found.wrench.known, expected, atol=1e-8)  # κ(J)² times rounding
     assert found.source.values == {"observer": "kfo-fe"}
     assert [remark.code for remark in found.wrench.remarks] == ["zero-removed"]
     with pytest.raises(MissingSignalError):
-        stored_force(Recording(t=TIMES, q=POSES), UR5, choice(), "kfo-fe")
+        replay.stored_force(Recording(t=TIMES, q=POSES), UR5, choice(), "kfo-fe")
     with pytest.raises(ParameterError, match="needs the log itself"):
-        stored_force(log, UR5, WrenchChoice(frame="base", solver="smoother"), "kfo-fe")
+        replay.stored_force(log, UR5, WrenchChoice(frame="base", solver="smoother"), "kfo-fe")
 
 
 def test_the_logs_sensor_drives_as_the_log_states_it():
     log = Recording(
         t=TIMES, q=POSES, wrench=-LOADED, wrench_frame=WrenchFrame("base", "flange", "by-robot")
     )
-    found = sensor_force(log, UR5, choice())
+    found = replay.sensor_force(log, UR5, choice())
     np.testing.assert_array_equal(found.wrench.values, LOADED)
     assert found.wrench.remarks == ()
     assert "BY the robot" in found.source.values["frame"]
-    unstated = sensor_force(Recording(t=TIMES, q=POSES, wrench=LOADED), UR5, choice())
+    unstated = replay.sensor_force(Recording(t=TIMES, q=POSES, wrench=LOADED), UR5, choice())
     assert unstated.source.values["frame"] == "frame not stated"
     codes = [remark.code for remark in unstated.wrench.remarks]
     assert codes == ["wrench-frame-unstated", "sensor-pose-unstated"]
@@ -403,10 +380,10 @@ def test_a_truth_file_s_wrench_is_the_force_and_torques_alone_are_none(tmp_path)
     file, axes = tmp_path / "truth.parquet", ("fx", "fy", "fz", "mx", "my", "mz")
     columns = {f"wrench/{axis}": LOADED[:, k] for k, axis in enumerate(axes)}
     pl.DataFrame({"t": TIMES, **columns}).write_parquet(file)
-    force = truth_force(Recording(t=TIMES, q=POSES), UR5, choice(), file)
+    force = replay.truth_force(Recording(t=TIMES, q=POSES), UR5, choice(), file)
     np.testing.assert_allclose(force.wrench.known, LOADED, atol=1e-12)
     assert force.source.values == {"file": "truth.parquet"}
     columns = {f"tau_ext/{j}": np.zeros(len(TIMES)) for j in range(1, 7)}
     pl.DataFrame({"t": TIMES, **columns}).write_parquet(file)
     with pytest.raises(ReferenceTorqueError, match="it has no wrench"):
-        truth_force(Recording(t=TIMES, q=POSES), UR5, choice(), file)
+        replay.truth_force(Recording(t=TIMES, q=POSES), UR5, choice(), file)

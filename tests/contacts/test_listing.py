@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -28,6 +29,11 @@ from vftcli.signals.recording import Recording
 from vftcli.simulation import load_scenario, simulate
 
 
+@cache
+def listed(name, robot, free=None):
+    return list_contacts(motion(read(FIXTURES / name), robot, free))
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "robot", "free", "rms", "count"),
@@ -37,7 +43,7 @@ from vftcli.simulation import load_scenario, simulate
         ("ur5_table1.csv", "ur5", "0.3:4", 6.0, 13),
     ],
 )
-def test_every_push_of_a_fixture_is_one_row(listed, name, robot, free, rms, count):
+def test_every_push_of_a_fixture_is_one_row(name, robot, free, rms, count):
     found = listed(name, robot, free)
     scored = score(found.contacts, true_contacts(*true_wrench(name)))
     assert (len(scored.pairs), scored.rows, len(scored.false)) == (count, count, 0)
@@ -54,7 +60,7 @@ def test_every_push_of_a_fixture_is_one_row(listed, name, robot, free, rms, coun
 
 
 @pytest.mark.slow
-def test_a_bearing_and_two_knocks_are_three_contacts(listed):
+def test_a_bearing_and_two_knocks_are_three_contacts():
     found = listed("panda_bearing.csv", "panda", "0.3:3.9")
     scored = score(found.contacts, true_contacts(*true_wrench("panda_bearing.csv")))
     assert len(scored.pairs) == 3
@@ -65,7 +71,7 @@ def test_a_bearing_and_two_knocks_are_three_contacts(listed):
     assert found[0].stop > 16.0
 
 
-def test_free_cycles_are_found_where_nothing_is_said(listed):
+def test_free_cycles_are_found_where_nothing_is_said():
     found = listed("ur5_circle.csv", "ur5")
     assert found.basis == "free motion"
     assert found.free
@@ -86,7 +92,7 @@ def part(recording: Recording, chosen: np.ndarray) -> Recording:
 
 
 @pytest.mark.slow
-def test_gaps_of_the_clock_move_no_row_by_more_than_a_few_blocks(listed):
+def test_gaps_of_the_clock_move_no_row_by_more_than_a_few_blocks():
     whole = read(FIXTURES / "ur5_circle.csv")
     k = np.arange(whole.samples)
     kept = k[~((k > 1100) & (k < 1125)) & ~((k > 300) & (k < 330))]

@@ -1,8 +1,9 @@
 """Repeated motions without dynamics, and the simulated circle with its truth."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import polars as pl
@@ -17,17 +18,11 @@ from vftcli.signals.recording import Recording
 FIXTURES = Path(__file__).parents[2] / "fixtures"
 
 
-@dataclass(frozen=True, kw_only=True)
-class Circle:
-    """The simulated UR5 circle of the fixtures and what really happened.
-
-    Attributes:
-        recording: The log.
-        truth: True external torque at its samples. (T, n) [N·m]
-    """
+class Circle(NamedTuple):
+    """The simulated UR5 circle of the fixtures and what really happened."""
 
     recording: Recording
-    truth: Array
+    truth: Array  # external torque at its samples (T, n) [N·m]
 
 
 @pytest.fixture(scope="session")
@@ -45,15 +40,8 @@ def repeated() -> Callable[..., Recording]:
     """A log of a periodic joint motion, as six harmonics would draw it."""
 
     def make(
-        period: float = 3.7,
-        cycles: float = 4.0,
-        rate: float = 100.0,
-        approach: float = 0.0,
-        hold: float = 0.0,
-        start: float = 0.0,
-        push: float = 0.0,
-        seed: int = 0,
-    ) -> Recording:
+        period=3.7, cycles=4.0, rate=100.0, approach=0.0, hold=0.0, start=0.0, push=0.0, seed=0
+    ):
         rng = np.random.default_rng(seed)
         t = np.arange(0.0, hold + approach + cycles * period + hold, 1.0 / rate)
         s = np.clip(t - hold - approach, 0.0, cycles * period) + start

@@ -1,6 +1,6 @@
 """The two-cycle difference against the simulated truth, and on real pairs of logs."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -46,12 +46,7 @@ def repeats(logs: Path) -> dict[str, Recording]:
     return {k: read(folder / f"free_repeat_{k}.csv", columns=UR10E) for k in "abc"}
 
 
-def two_cycle_difference(
-    recording: Recording,
-    free: Recording | Sequence[Recording],
-    robot: Robot,
-    choice: FreeChoice | None = None,
-) -> ExternalTorque:
+def two_cycle_difference(recording, free, robot, choice=None) -> ExternalTorque:
     """The reference of a log by its own cycles, or by one or several free logs."""
     log = Run(recording=recording, robot=robot)
     others = (free,) if isinstance(free, Recording) else tuple(free)

@@ -6,24 +6,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from vftcli.identification.links import (
-    DOUBTFUL,
-    WEIGHTS,
-    Grouping,
-    Problem,
-    Triangles,
-    base_parameters,
-    group_parameters,
-    is_physical,
-    nearest_physical_links,
-    predicts_best_unpulled,
-    pseudo_inertias,
-    residuals,
-    stack,
-    thicken_links,
-    triangle,
-    triangulate,
-)
+from vftcli.identification import links
 from vftcli.identification.shapes import Shape
 from vftcli.identification.training import ParameterColumns, PreparedLog
 from vftcli.robots import load_robot
@@ -66,11 +49,11 @@ def test_rows_are_the_equation_of_motion(log):
 
 
 def test_triangles_are_the_weighted_equations(log):
-    left = residuals(LAYOUT, log, planted())
+    left = links.residuals(LAYOUT, log, planted())
     used = left[log.weights[:, 0] > 0]
     sigma = 1.4826 * np.median(np.abs(used), axis=0)
     left[log.weights[:, 0] == 0] = 1e6  # samples of no weight do not count
-    triangles = triangulate(LAYOUT, [log], left=[left])
+    triangles = links.triangulate(LAYOUT, [log], left=[left])
     z = np.abs(left / sigma)
     weights = log.weights * np.where(z > 2.5, 2.5 / np.maximum(z, 2.5), 1.0)
     A = LAYOUT.rows(log, slice(0, len(left)))
@@ -101,12 +84,12 @@ def frictionless(name, rotor):
 )
 def test_ranks_are_the_published_ones(name, rotor, rank):
     """UR5 36 of 60 inertial, 58 of 84 with 18 friction numbers; Panda 43 of 70, 69 of 98."""
-    assert len(group_parameters(frictionless(name, rotor)).independent) == rank
+    assert len(links.group_parameters(frictionless(name, rotor)).independent) == rank
 
 
 def test_equal_base_parameters_mean_equal_torque():
     layout = frictionless("panda", False)
-    chain, grouping = layout.chain, group_parameters(layout)
+    chain, grouping = layout.chain, links.group_parameters(layout)
     phi = chain_parameters(chain)
     other = phi.copy()
     rng = np.random.default_rng(0)
@@ -121,13 +104,13 @@ def test_equal_base_parameters_mean_equal_torque():
 
 
 def test_sums_are_written_with_signs_and_factors():
-    grouping = Grouping((0, 2), (1, 3), np.array([[1.0, -0.25], [0.0, 1e-12]]))
+    grouping = links.Grouping((0, 2), (1, 3), np.array([[1.0, -0.25], [0.0, 1e-12]]))
     assert grouping.sums(("a", "b", "c", "d")) == ["a + b - 0.25 d", "c"]
     np.testing.assert_allclose(grouping.values(np.array([1.0, 2.0, 3.0, 4.0])), [2.0, 3.0])
 
 
 @pytest.fixture
-def excited(prepared, sines) -> tuple[Triangles, np.ndarray, np.ndarray]:
+def excited(prepared, sines) -> tuple[links.Triangles, np.ndarray, np.ndarray]:
     """Equations of a UR5 of known parameters with friction, its profile, and the truth."""
     chain = load_robot("ur5").chain
     t, q, dq, ddq = sines(seconds=12.0, seed=1)
@@ -137,14 +120,14 @@ def excited(prepared, sines) -> tuple[Triangles, np.ndarray, np.ndarray]:
     tau = layout.rows(prepared(t, q=q, dq=dq, ddq=ddq), slice(0, len(t))) @ true
     noise = 0.1 * np.random.default_rng(3).standard_normal(q.shape)
     log = prepared(t, q=q, dq=dq, ddq=ddq, tau=tau + noise)
-    return stack(layout, [log], start), start, true
+    return links.stack(layout, [log], start), start, true
 
 
 def test_estimates_lie_within_their_spread(excited):
     triangles, start, true = excited
-    found = base_parameters(triangles, start)
+    found = links.base_parameters(triangles, start)
     layout = triangles.layout
-    grouping = group_parameters(layout)
+    grouping = links.group_parameters(layout)
     values, sd, sure = (found[key].to_numpy() for key in ("value", "sd", "determined"))
     z = (values - grouping.values(true)) / sd
     assert sure.sum() > 20
@@ -155,14 +138,14 @@ def test_estimates_lie_within_their_spread(excited):
     assert 0.6 < np.sqrt(np.mean(z[sure] ** 2)) < 1.4
     assert np.max(np.abs(z[sure])) < 4.5
     size = np.maximum(np.abs(values), np.abs(grouping.values(start)))
-    np.testing.assert_array_equal(sure, sd <= DOUBTFUL * size)
+    np.testing.assert_array_equal(sure, sd <= links.DOUBTFUL * size)
 
 
 def test_what_no_data_tells_keeps_the_start_and_has_no_spread(excited):
     triangles, start, _ = excited
     seen = np.arange(triangles.layout.size + 1) != 70
     blind = triangles._replace(parts=tuple(part * seen for part in triangles.parts))
-    found = base_parameters(blind, start)
+    found = links.base_parameters(blind, start)
     assert triangles.layout.names[70] == "coulomb6"
     (row,) = [row for row in found.to_dicts() if row["parameter"] == "coulomb6"]
     assert row == {"parameter": "coulomb6", "value": start[70], "sd": np.inf, "determined": False}
@@ -176,8 +159,10 @@ def stacked(chain, phi, noise, seed=0, samples=300):
     Y = torque_regressor(chain, q, dq, ddq)
     tau = Y @ phi + noise * rng.normal(size=(samples, chain.joints))
     rows = np.concatenate([Y, tau[:, :, None]], axis=2) / noise
-    parts = tuple(triangle(part.reshape(-1, rows.shape[2])) for part in np.array_split(rows, 5))
-    return Triangles(layout, parts, 1.0), (q, dq, ddq)
+    parts = tuple(
+        links.triangle(part.reshape(-1, rows.shape[2])) for part in np.array_split(rows, 5)
+    )
+    return links.Triangles(layout, parts, 1.0), (q, dq, ddq)
 
 
 def perturbed(chain, seed):
@@ -192,13 +177,13 @@ def perturbed(chain, seed):
     )
 
 
-@pytest.mark.parametrize(("name", "weight"), [("ur10e", 1.0), ("panda", WEIGHTS[0])])
+@pytest.mark.parametrize(("name", "weight"), [("ur10e", 1.0), ("panda", links.WEIGHTS[0])])
 def test_the_nearest_links_are_physical_and_predict(name, weight):
     robot = load_robot(name)
     true = perturbed(robot.chain, 3)
     triangles, state = stacked(robot.chain, chain_parameters(true), noise=0.5)
-    x = nearest_physical_links(triangles, chain_parameters(robot.chain), weight)
-    assert is_physical(x)
+    x = links.nearest_physical_links(triangles, chain_parameters(robot.chain), weight)
+    assert links.is_physical(x)
     made = with_parameters(robot.chain, x, np.zeros(robot.joints)).to_pinocchio()
     for body in made.inertias[1:]:
         assert np.all(np.linalg.eigvalsh(np.array(body.inertia)) > 0)
@@ -215,14 +200,14 @@ def test_the_nearest_links_are_physical_and_predict(name, weight):
 def test_a_point_mass_is_thickened_and_the_physical_stays():
     chain = load_robot("ur10e").chain
     phi = chain_parameters(chain)
-    assert is_physical(thicken_links(phi))
+    assert links.is_physical(links.thicken_links(phi))
     flat = phi.copy()
     flat[14:20] = 0.0  # a tensor of nothing about the origin, with mass away from it
-    assert not is_physical(flat)
-    assert is_physical(thicken_links(flat))
+    assert not links.is_physical(flat)
+    assert links.is_physical(links.thicken_links(flat))
     healthy = chain_parameters(load_robot("panda").chain)
     # already physical: only rounding of an eigendecomposition
-    np.testing.assert_allclose(thicken_links(healthy), healthy, atol=1e-12)
+    np.testing.assert_allclose(links.thicken_links(healthy), healthy, atol=1e-12)
 
 
 def test_pseudo_inertia_of_a_point_mass():
@@ -231,23 +216,25 @@ def test_pseudo_inertia_of_a_point_mass():
     tensor = 2.0 * (c @ c * np.eye(3) - np.outer(c, c))
     phi = np.array([2.0, *(2.0 * c), *(tensor[r, c] for r, c in TENSOR)])
     expected = 2.0 * np.outer([*c, 1.0], [*c, 1.0])
-    np.testing.assert_allclose(pseudo_inertias(phi)[0], expected, atol=1e-15)
+    np.testing.assert_allclose(links.pseudo_inertias(phi)[0], expected, atol=1e-15)
 
 
 def test_the_profile_is_of_use_where_noise_hides_the_arm():
     """Links 20 % off, 50 N·m of noise."""
     chain = load_robot("ur5").chain
     triangles, _ = stacked(chain, chain_parameters(perturbed(chain, 2)), noise=50.0)
-    assert not predicts_best_unpulled(triangles, chain_parameters(chain))
+    assert not links.predicts_best_unpulled(triangles, chain_parameters(chain))
 
 
 def test_a_step_is_newton_s_and_its_decrement_what_the_cost_falls_and_bends_by():
     """Along s = −H⁻¹g slope and curvature are −gᵀH⁻¹g and gᵀH⁻¹g, by central differences."""
     chain, rng = load_robot("ur5").chain, np.random.default_rng(1)
     layout = ParameterColumns(chain, True, (Shape(()),) * 6)
-    start = np.concatenate([thicken_links(chain_parameters(chain)), np.linspace(0.5, 3.0, 6)])
+    start = np.concatenate(
+        [links.thicken_links(chain_parameters(chain)), np.linspace(0.5, 3.0, 6)]
+    )
     R = 3.0 * np.triu(rng.standard_normal((66, 66)))
-    problem = Problem(R, R @ start, start, layout, 2.0)
+    problem = links.Problem(R, R @ start, start, layout, 2.0)
     x = start * np.append(np.repeat(rng.uniform(0.8, 1.2, 6), 10), rng.uniform(0.5, 1.5, 6))
     step, decrement = problem.step(x)
     before, here, after = (problem.value(x + h * step) for h in (-1e-3, 0.0, 1e-3))
@@ -259,12 +246,12 @@ def test_a_step_is_newton_s_and_its_decrement_what_the_cost_falls_and_bends_by()
 def test_correlated_equations_count_less():
     chain = load_robot("ur5").chain
     triangles, _ = stacked(chain, chain_parameters(perturbed(chain, 2)), noise=0.5)
-    start = thicken_links(chain_parameters(chain))
+    start = links.thicken_links(chain_parameters(chain))
     correlated = triangles._replace(correlation=100.0)
-    slow = nearest_physical_links(correlated, chain_parameters(chain), 1.0)
-    strong = nearest_physical_links(triangles, chain_parameters(chain), 100.0)
+    slow = links.nearest_physical_links(correlated, chain_parameters(chain), 1.0)
+    strong = links.nearest_physical_links(triangles, chain_parameters(chain), 100.0)
     # a hundredth of the equations under a pull of 1 is all of them under one of 100
-    problem = Problem(*triangles.joined(), start, triangles.layout, 100.0)
+    problem = links.Problem(*triangles.joined(), start, triangles.layout, 100.0)
     # both stop within a decrement of 1e-3, which is 0.1 of the hundredfold cost
     assert problem.value(slow) == pytest.approx(problem.value(strong), abs=0.2)
     assert problem.value(slow) < problem.value(start) - 10.0
@@ -273,9 +260,9 @@ def test_correlated_equations_count_less():
 def test_costs_outside_the_physical_models_are_infinite():
     chain = load_robot("ur5").chain
     layout = ParameterColumns(chain, True, (Shape(()),) * 6)
-    start = np.concatenate([thicken_links(chain_parameters(chain)), np.ones(6)])
+    start = np.concatenate([links.thicken_links(chain_parameters(chain)), np.ones(6)])
     nothing = np.zeros((layout.size, layout.size)), np.zeros(layout.size)
-    problem = Problem(*nothing, start, layout, 2.0)
+    problem = links.Problem(*nothing, start, layout, 2.0)
     assert problem.value(start) == pytest.approx(0.0, abs=1e-12)
     bad_link, bad_rotor = start.copy(), start.copy()
     bad_link[0], bad_rotor[-1] = -1.0, 0.0

@@ -6,19 +6,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from vftcli.identification import friction_fit
+from vftcli.identification import friction_fit, methods
 from vftcli.identification.clean_fit import CleanFit
 from vftcli.identification.friction_fit import PreslidingScore, fit_frictions
 from vftcli.identification.links import stack
-from vftcli.identification.methods import (
-    by_constant,
-    check_friction,
-    fit_remarks,
-    friction_method,
-    initial_columns,
-    rotor_number,
-    whole_arm,
-)
 from vftcli.identification.training import (
     moving_joints,
     prepare,
@@ -63,16 +54,16 @@ def test_friction_that_pushes_everywhere_is_refused_and_a_little_is_reported(dat
         parameters = {"coulomb": coulomb, "viscous": viscous, "quadratic": quadratic}
         return JointFriction(model="coulomb-viscous-quadratic", parameters=parameters)
 
-    assert not list(check_friction(0, friction(1.0, 1.0), data))
+    assert not list(methods.check_friction(0, friction(1.0, 1.0), data))
     speed = np.max(np.abs(data.logs[0].dq[:, 0]))
     ends = f"as {-5 - 0.5 * speed:.2g} to {-5 - 5 * speed:.2g} N·m: it would push"
     with pytest.raises(IdentificationError, match=f"of joint 1 comes out {ends}"):
-        list(check_friction(0, friction(-5.0, -5.0), data))
-    (remark,) = check_friction(2, friction(-2.0, 5.0), data)
+        list(methods.check_friction(0, friction(-5.0, -5.0), data))
+    (remark,) = methods.check_friction(2, friction(-2.0, 5.0), data)
     speed = np.max(np.abs(data.logs[0].dq[:, 2]))
     assert remark.where.joints == (3,)
     assert remark.values["least_Nm"] == pytest.approx(-2.0 + 0.5 * speed)
-    (remark,) = check_friction(2, friction(1.0, 5.0, -1.0), data)
+    (remark,) = methods.check_friction(2, friction(1.0, 5.0, -1.0), data)
     assert remark.code == "falling-friction"
     # 5 − 2 v = 0, seen in 500 steps up to the joint's limit
     limit = data.robot.limits.qd_max[2]
@@ -84,7 +75,7 @@ def test_joints_that_are_held_are_reported(data):
     moves = np.array([True, False, True, True, True, True])
     reverses = np.array([True, False, False, True, True, True])
     held = data._replace(moves=moves, reverses=reverses, rubs=False)
-    remarks = friction_method(held, CleanFit(held, fit_frictions(held), [])).remarks
+    remarks = methods.friction_method(held, CleanFit(held, fit_frictions(held), [])).remarks
     reported = [(r.code, r.where.joints) for r in remarks if r.code.endswith("-joint")]
     assert reported == [("static-joint", (2,)), ("one-way-joint", (3,))]
 
@@ -103,7 +94,7 @@ def test_joints_that_are_held_are_reported(data):
 )
 def test_a_rotor_inertia_is_known_or_the_profile_s_is_refuted(value, sd, taken, code):
     """The profile's is 2 kg·m²."""
-    found, remarks = rotor_number(3, value, sd, 2.0)
+    found, remarks = methods.rotor_number(3, value, sd, 2.0)
     assert (found.joint, found.unit, found.determined) == (4, "kg·m²", taken is not None)
     assert found.value == (value if taken is None else taken)
     assert [(r.code, r.where.joints) for r in remarks] == ([(code, (4,))] if code else [])
@@ -115,7 +106,7 @@ def test_what_was_fitted_is_remarked_on_in_its_units(data, prepared):
     warm = prepared(T, dq=np.zeros((len(T), 3)), warmth=np.array([[0.9], [1.2]]))
     score = PreslidingScore(1e-3, {0.0: 1.0, 1e-3: 0.5})
     fits = {2: SimpleNamespace(at_bound=("coulomb", "viscous"), presliding=score)}
-    remarks = list(fit_remarks(data._replace(logs=(warm,)), fits))
+    remarks = list(methods.fit_remarks(data._replace(logs=(warm,)), fits))
     assert [(r.code, list(r.values.values())) for r in remarks] == [
         ("friction-at-bound", ["coulomb and viscous"]),
         ("presliding-length", [1.0, [0.0, 1.0], [1.0, 0.5]]),
@@ -125,19 +116,19 @@ def test_what_was_fitted_is_remarked_on_in_its_units(data, prepared):
 
 def test_a_current_that_falls_with_the_torque_is_refused(data):
     before = data.robot.torque_constant[1]
-    values, sd, K = by_constant(data, 1, np.array([8.0, 0.8]), np.array([0.4, 0.02]))
+    values, sd, K = methods.by_constant(data, 1, np.array([8.0, 0.8]), np.array([0.4, 0.02]))
     np.testing.assert_allclose([*values, *sd], [10.0, 1.0, 0.5, 0.025])
     assert K[:2] == (2, "torque_constant")
     assert K[2:4] == pytest.approx((before / 0.8, before * 0.02 / 0.8**2))
     with pytest.raises(IdentificationError, match=r"of joint 1 does not .* \(slope 0\.05\)"):
-        by_constant(data, 0, np.array([0.05]), np.array([0.01]))
+        methods.by_constant(data, 0, np.array([0.05]), np.array([0.01]))
 
 
 def test_a_wrong_drive_constant_scales_friction_and_rotor(recording, arm):
     """Currents of an arm whose K is 1.05 × the profile's: all torques are 1.05 × what is read."""
     log = replace(recording, current=recording.current / 1.05)
     data = prepare_training([log], arm, fit_constants=True)
-    found = friction_method(data)
+    found = methods.friction_method(data)
     K = {n.joint: n for n in found.numbers if n.parameter == "torque_constant"}
     # joints that carry weight; the wrists' load is no larger than the noise
     for j in (2, 3):
@@ -150,7 +141,7 @@ def test_a_wrong_drive_constant_scales_friction_and_rotor(recording, arm):
 
 @pytest.mark.slow
 def test_the_whole_arm_says_how_it_was_made(data, arm):
-    base = whole_arm(data)
+    base = methods.whole_arm(data)
     assert "nearest-physical-model" in {r.code for r in base.remarks}
     (opened,) = [r for r in base.remarks if r.code == "undetermined-base-parameters"]
     assert opened.values["count"] == 40
@@ -163,7 +154,7 @@ def test_the_whole_arm_says_how_it_was_made(data, arm):
 
 
 def test_too_short_logs_are_refused(data):
-    layout, start = initial_columns(data, fit_frictions(data))
+    layout, start = methods.initial_columns(data, fit_frictions(data))
     few = np.zeros_like(data.logs[0].weights)
     few.ravel()[: 4 * layout.size - 1] = 1.0
     with pytest.raises(IdentificationError, match="record a longer log"):
@@ -180,7 +171,7 @@ def test_a_joint_that_the_profile_predicts_better_keeps_its_numbers(data, arm, m
     assert fits[0]._replace(errors=(1.0, 0.84)).is_kept
     assert not fits[0]._replace(errors=(1.0, np.nan)).is_kept
     monkeypatch.setattr(friction_fit, "KEPT", 2.0)
-    found = friction_method(data)
+    found = methods.friction_method(data)
     reported = [r.where.joints for r in found.remarks if r.code == "profile-kept"]
     assert reported == [(j,) for j in range(1, 7)]
     assert found.robot.friction == arm.friction

@@ -12,24 +12,10 @@ from made_terms import momentum_of
 from typer.testing import CliRunner
 
 from vftcli.cli import make_app
-from vftcli.observers import ObserverChoice
+from vftcli.observers import ObserverChoice, tuning
 from vftcli.observers.observer import Observer
 from vftcli.observers.spectra import Spectra, spectra_of
 from vftcli.observers.table import PAPER, Setup, build_observers
-from vftcli.observers.tuning import (
-    KINDS,
-    bound_remarks,
-    bounds_reached,
-    crossings,
-    error_curve,
-    kalman_filter,
-    kalman_smoother,
-    match_observers,
-    noise_level,
-    parse_goal,
-    tune_all,
-    tune_to_spectra,
-)
 from vftcli.robots import load_robot
 from vftcli.robots.run import RunSamples
 from vftcli.signals.errors import ParameterError, VftError
@@ -50,25 +36,28 @@ def spectra(noise: float = 1e-3) -> Spectra:
 
 
 def test_every_observer_reaches_the_stated_delay_or_bandwidth():
-    for line in tune_all(spectra(), parse_goal("delay=0.05")):
+    for line in tuning.tune_all(spectra(), tuning.parse_goal("delay=0.05")):
         expected = 0.0 if line.observer == "kfo-rts" else 0.05
         np.testing.assert_allclose(line.delay, expected, atol=1e-9)
-    lines = {line.observer: line for line in tune_all(spectra(), parse_goal("bandwidth=3"))}
-    smoother = kalman_smoother(lines["kfo-rts"].rate)
+    lines = {
+        line.observer: line
+        for line in tuning.tune_all(spectra(), tuning.parse_goal("bandwidth=3"))
+    }
+    smoother = tuning.kalman_smoother(lines["kfo-rts"].rate)
     np.testing.assert_allclose(smoother.tuning(STEP, 2).bandwidth, 3.0, rtol=1e-12)
     # FDO and GMO are one filter where they share a rate
     np.testing.assert_allclose(lines["fdo"].rate, lines["gmo"].rate)
 
 
 def test_few_false_alarms_cost_bandwidth():
-    many = tune_all(spectra(0.3), parse_goal("false-alarms=1000", "8"))
-    few = tune_all(spectra(0.3), parse_goal("false-alarms=0.01", "8"))
+    many = tuning.tune_all(spectra(0.3), tuning.parse_goal("false-alarms=1000", "8"))
+    few = tuning.tune_all(spectra(0.3), tuning.parse_goal("false-alarms=0.01", "8"))
     for fast, slow in zip(many, few, strict=True):
         assert slow.alarms is not None
         assert np.all(slow.rate <= fast.rate)
         assert np.all(slow.alarms <= 0.01)
     with pytest.raises(ParameterError, match=r"too loud for the threshold on J1"):
-        tune_all(spectra(50.0), parse_goal("false-alarms=0.01", "0.5"))
+        tuning.tune_all(spectra(50.0), tuning.parse_goal("false-alarms=0.01", "0.5"))
 
 
 @pytest.mark.parametrize(
@@ -76,7 +65,7 @@ def test_few_false_alarms_cost_bandwidth():
 )
 def test_goals_that_are_none(words):
     with pytest.raises(ParameterError, match=r"--gains|alarm\.threshold"):
-        parse_goal(*words.split())
+        tuning.parse_goal(*words.split())
 
 
 def test_a_tuned_file_goes_into_a_comparison(tmp_path):
@@ -112,15 +101,15 @@ def test_a_constant_error_brings_one_threshold_nearer(offset):
     power[0] = offset**2
     sides = np.array([2.0 - offset, 2.0 + offset])
     expected = 7200.0 * np.exp(-(sides**2) / 4.5).sum()
-    assert crossings(power, f, np.array([2.0]))[0] == pytest.approx(expected, rel=1e-12)
+    assert tuning.crossings(power, f, np.array([2.0]))[0] == pytest.approx(expected, rel=1e-12)
     # at the threshold it is an alarm without end
     power = np.array([[4.0], [1.0]])
-    assert crossings(power, np.array([0.0, 2.0]), np.array([2.0]))[0] == np.inf
+    assert tuning.crossings(power, np.array([0.0, 2.0]), np.array([2.0]))[0] == np.inf
 
 
 def test_the_one_rate_of_filtered_dynamics_lies_between_those_of_the_joints():
     """It has the smallest mean error; each joint by itself could have less."""
-    fdo, gmo, *_ = tune_all(spectra(0.3), parse_goal("auto"))
+    fdo, gmo, *_ = tuning.tune_all(spectra(0.3), tuning.parse_goal("auto"))
     assert fdo.gains["omega"] == fdo.rate[0] == fdo.rate[1]
     assert np.min(gmo.rate) < fdo.rate[0] < np.max(gmo.rate)
     assert np.all(gmo.rmse < fdo.rmse)
@@ -130,23 +119,23 @@ def test_a_threshold_is_one_or_one_a_joint():
     with pytest.raises(
         ParameterError, match=r"alarm.threshold has 3 values; .* each of 2 joints"
     ):
-        tune_all(spectra(), parse_goal("auto", "1,2,3"))
-    for line in tune_all(spectra(), parse_goal("auto", "1,2")):
+        tuning.tune_all(spectra(), tuning.parse_goal("auto", "1,2,3"))
+    for line in tuning.tune_all(spectra(), tuning.parse_goal("auto", "1,2")):
         assert line.alarms is not None
 
 
 def test_a_gain_at_a_bound_is_said_with_the_numbers():
     """No torque beyond the noise: every observer runs to the slowest; a stated delay has none."""
-    quiet, goal = spectra(), parse_goal("auto")
+    quiet, goal = spectra(), tuning.parse_goal("auto")
     silent = replace(quiet, loaded=quiet.free)
-    remarks = bounds_reached(tune_all(silent, goal), silent, goal)
+    remarks = tuning.bounds_reached(tuning.tune_all(silent, goal), silent, goal)
     assert {r.where.about for r in remarks} == {"fdo", "gmo", "kfo-zoh", "kfo-rts"}
     for remark in remarks:
         assert (remark.code, remark.level) == ("gain-at-slowest", "warning")
         assert remark.values["rate_rad_s"] == 1.0
-    assert bounds_reached(tune_all(quiet, goal), quiet, goal) == ()
-    slow = parse_goal("delay=1")
-    assert bounds_reached(tune_all(quiet, slow), quiet, slow) == ()
+    assert tuning.bounds_reached(tuning.tune_all(quiet, goal), quiet, goal) == ()
+    slow = tuning.parse_goal("delay=1")
+    assert tuning.bounds_reached(tuning.tune_all(quiet, slow), quiet, slow) == ()
 
 
 def low_passed_noise(samples: int, corner: float, seed: int) -> np.ndarray:
@@ -171,11 +160,11 @@ def pushed(
     return samples_of(terms, ~free), samples_of(terms, free)
 
 
-@pytest.mark.parametrize("name", KINDS)
+@pytest.mark.parametrize("name", tuning.KINDS)
 def test_the_expected_error_is_the_measured_one(name):
     """The spectra predict the rmse that the tuned observer then has against the truth."""
     loaded, free = pushed()
-    observer = tune_to_spectra(name, spectra_of(loaded, [free]))
+    observer = tuning.tune_to_spectra(name, spectra_of(loaded, [free]))
     tau = observer.estimate(loaded.run.terms).tau
     truth = 5.0 * low_passed_noise(8000, 6.0, 1) * loaded.inside[:, None]
     inner = loaded.inside.copy()
@@ -189,10 +178,10 @@ def test_the_expected_error_is_the_measured_one(name):
 def test_tuning_finds_the_best_of_all_natural_frequencies():
     loaded, free = pushed()
     spectra = spectra_of(loaded, [free])
-    found = error_curve(kalman_filter, spectra)
+    found = tuning.error_curve(tuning.kalman_filter, spectra)
 
     def expected(omega_n: np.ndarray) -> np.ndarray:
-        response = kalman_filter(omega_n).frequency_response(spectra.frequency, STEP, 2)
+        response = tuning.kalman_filter(omega_n).frequency_response(spectra.frequency, STEP, 2)
         return np.sqrt(spectra.missed(response) + spectra.passed(response))
 
     np.testing.assert_allclose(expected(found.best), found.least, rtol=1e-12)
@@ -205,7 +194,7 @@ def test_the_noise_level_gives_innovations_their_expected_variance():
     loaded, free = pushed()
     spectra = spectra_of(loaded, [free])
     omega_n = np.array([20.0, 40.0])
-    observer = kalman_filter(omega_n, noise_level(omega_n, spectra))
+    observer = tuning.kalman_filter(omega_n, tuning.noise_level(omega_n, spectra))
     settled, model = observer.steady(STEP, 2), observer.model(STEP, 2)
     tau = observer.estimate(loaded.run.terms).tau
     nu = ((tau[1:] - model.a22 * tau[:-1]) / settled.l2)[4199:]
@@ -229,7 +218,7 @@ def test_without_spectra_auto_falls_back_and_says_so():
 
 def test_a_bound_is_never_reached_in_silence():
     grid = np.array([1.0, 10.0, 250.0])
-    slow, fast = bound_remarks("kfo-auto", np.array([1.0, 10.0, 250.0, 1.0]), grid)
+    slow, fast = tuning.bound_remarks("kfo-auto", np.array([1.0, 10.0, 250.0, 1.0]), grid)
     assert (slow.code, fast.code) == ("gain-at-slowest", "gain-at-fastest")
     assert slow.level == fast.level == "warning"
     assert (slow.where.joints, fast.where.joints) == ((1, 4), (3,))
@@ -250,7 +239,7 @@ def test_best_keeps_a_push_where_the_log_shows_none():
     quiet = DynamicsTerms(t=t, p=p, mu=np.zeros_like(p))
     kept = {}
     for name in ("best", "rts-auto"):
-        observer = tune_to_spectra(name, spectra_of(free, [free]))
+        observer = tuning.tune_to_spectra(name, spectra_of(free, [free]))
         kept[name] = float(observer.estimate(quiet).tau[:, 0].max())
     # The grid of natural frequencies is 7 % fine, of which the peak moves by a third.
     assert kept["best"] == pytest.approx(left, rel=0.025)
@@ -272,8 +261,8 @@ def setup(step: float = 0.008, **changed: object) -> Setup:
 def tuned(goal: str, step: float = 0.008, convention: str | None = None) -> list[Observer]:
     settings = {"kfo": {"noise_convention": convention}} if convention else {}
     how = setup(step, settings=settings)
-    asked = parse_goal(goal, allowed=("delay", "bandwidth"))
-    return list(match_observers(build_observers(PAPER, how)[0], asked, step, 3)[0])
+    asked = tuning.parse_goal(goal, allowed=("delay", "bandwidth"))
+    return list(tuning.match_observers(build_observers(PAPER, how)[0], asked, step, 3)[0])
 
 
 @pytest.mark.parametrize("step", [0.001, 0.008])
@@ -343,7 +332,7 @@ def test_one_joint_out_of_reach_is_refused():
     how = setup(gains=gains)
     observers, _ = build_observers(["kfo-zoh"], how)
     with pytest.raises(ParameterError, match=r"no gain gives kfo-zoh a delay of 0\.02 s"):
-        match_observers(observers, parse_goal("delay=0.02"), 0.008, 3)
+        tuning.match_observers(observers, tuning.parse_goal("delay=0.02"), 0.008, 3)
 
 
 def test_printed_formulas_are_not_matched():
@@ -354,9 +343,11 @@ def test_printed_formulas_are_not_matched():
 
 def test_first_order_observers_are_called_alike_only_where_both_run():
     observers, _ = build_observers(["fdo", "kfo-zoh"], setup())
-    _, (remark,) = match_observers(observers, parse_goal("bandwidth=3"), 0.008, 3)
+    _, (remark,) = tuning.match_observers(observers, tuning.parse_goal("bandwidth=3"), 0.008, 3)
     assert (remark.code, remark.values) == ("bandwidth-matched", {"bandwidth_Hz": 3.0})
     observers, _ = build_observers(PAPER, setup())
-    _, (matched, alike) = match_observers(observers, parse_goal("delay=0.05"), 0.008, 3)
+    _, (matched, alike) = tuning.match_observers(
+        observers, tuning.parse_goal("delay=0.05"), 0.008, 3
+    )
     assert (matched.code, matched.values) == ("delay-matched", {"delay_s": 0.05})
     assert alike.code == "first-order-observers-alike"

@@ -12,6 +12,18 @@ from vftcli.signals.errors import ParameterError
 from vftcli.wrench import FIT, WrenchChoice, ZeroChoice
 
 
+def test_a_named_solver_is_every_observers_and_else_the_smoother_is_for_best():
+    # the smoother's σ_min, null space and mask are pinv's
+    for solver, by_pose, best, other in (
+        (None, "pinv", True, False),
+        ("smoother", "pinv", True, True),
+        ("map", "map", False, False),
+    ):
+        choice = WrenchChoice(solver=solver)
+        found = choice.by_pose, choice.smooths("best"), choice.smooths("kfo-fe")
+        assert found == (by_pose, best, other)
+
+
 def test_a_zero_is_spans_or_the_start():
     assert ZeroChoice.parsed(["1:2", "8:9"]).spans == ((1.0, 2.0), (8.0, 9.0))
     assert ZeroChoice.parsed(["start"]) == ZeroChoice(start=True)

@@ -23,6 +23,7 @@ from vftcli.signals.wrench import AXES
 from vftcli.wrench.model_error import TorqueNoise
 from vftcli.wrench.smoother import (
     BLOCK,
+    GRID,
     LEVER,
     MOST_BLOCKS,
     UNLISTED,
@@ -327,3 +328,9 @@ def test_wrench_and_model_error_keep_their_variance_while_they_last():
     length = np.where(np.arange(COUNT) == 10, 3.1, SECONDS)[1:, None]
     np.testing.assert_allclose(decay[1:, 6:], np.repeat(np.exp(-length / 0.5), 6, axis=1))
     np.testing.assert_allclose(decay[[5, 10], 0], np.exp([-SECONDS / 2.0, -3.1 / 2.0]))
+
+
+def test_what_keeps_for_half_a_minute_and_hardly_changes_in_a_second_is_a_load():
+    """σ_f √(2/τ_w) is 15 N for (30 s, 60 N), pushes in a row, and 5 N for (300 s, 60 N)."""
+    steady = [(prior.time, prior.force) for prior in GRID if prior.is_steady]
+    assert steady == [(30, 10), (100, 10), (100, 30), (300, 10), (300, 30), (300, 60)]
