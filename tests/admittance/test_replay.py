@@ -273,9 +273,13 @@ def replayed(made=None, way=None, *, parameters=PARAMETERS, **others) -> replay.
     return found
 
 
-def test_nothing_is_said_of_a_replay_without_trouble():
+def test_the_travel_of_a_log_that_moves_is_reported_and_nothing_without_trouble():
     assert not [*replay.trouble(replayed())]
-    assert not [*replay.trouble(replayed(logged=np.full((5, 6), 0.005)))]
+    logged = np.full((5, 6), 0.005)
+    assert not [*replay.trouble(replayed(logged=logged))]
+    logged[:, :3], logged[3, :3] = 0.0, [0.03, 0.0, 0.04]
+    (remark,) = replay.trouble(replayed(logged=logged))
+    assert remark.values["distance_m"] == pytest.approx(0.05)
 
 
 def test_each_limit_is_reported_with_its_number_and_its_controller():
@@ -328,13 +332,6 @@ def test_the_axis_nearest_to_its_threshold_is_named():
 
 def drag(begin: int, release: int, axis: int = 2) -> Drag:
     return Drag(axis=axis, number=1, begin=begin, release=release, end=release)
-
-
-def test_the_travel_of_a_log_that_moves_is_reported():
-    logged = np.zeros((5, 6))
-    logged[3, :3], logged[4, 3:] = [0.03, 0.0, 0.04], 1.0
-    (remark,) = replay.trouble(replayed(logged=logged))
-    assert remark.values["distance_m"] == pytest.approx(0.05)
 
 
 TIMES = np.arange(0.0, 4.0, 0.01)

@@ -86,16 +86,22 @@ def test_every_contact_is_detected_or_missed_with_its_delay_and_force():
     assert check.reference == "file:truth"
 
 
-def test_an_axis_tells_what_no_joint_does():
-    check = check_contacts(estimated(), limits(1e3, 20.0), *truth())
-    assert [c.by for c in check.contacts] == ["fz", "", "fz"]
-
-
-def test_an_alarm_where_nothing_touches_is_false():
-    spike = np.where(np.abs(T - 12.0) < 0.05, 99.0, 0.0)
-    check = check_contacts(estimated(spike), limits(10.0, 1e3), *truth())
-    assert check.false_alarms == 1
-    assert [c.by for c in check.contacts] == ["J2", "", "J2"]
+@pytest.mark.parametrize(
+    ("extra", "torque", "force", "by", "false"),
+    [
+        (0.0, 1e3, 20.0, ["fz", "", "fz"], 0),  # an axis tells what no joint does
+        (np.where(np.abs(T - 12.0) < 0.05, 99.0, 0.0), 10.0, 1e3, ["J2", "", "J2"], 1),
+        (0.0, 1e3, 1e3, ["", "", ""], 0),
+    ],
+)
+def test_who_tells_a_contact_and_what_is_false(extra, torque, force, by, false):
+    check = check_contacts(estimated(extra), limits(torque, force), *truth())
+    assert [c.by for c in check.contacts] == by
+    assert check.false_alarms == false
+    if not any(by):
+        assert check.detected == ()
+        assert np.isnan([check.median_delay, check.longest_delay]).all()
+        assert check.largest_missed == 40.0
 
 
 def test_without_a_wrench_the_force_is_not_known():
@@ -113,14 +119,6 @@ def test_without_a_truth_the_alarms_are_listed_with_what_is_estimated():
     assert np.isnan(check.median_delay)
     assert check.smallest_detected == 25.0
     assert [remark.code for remark in check.remarks] == ["check-without-truth"]
-
-
-def test_nothing_detected_and_nothing_there():
-    check = check_contacts(estimated(), limits(1e3, 1e3), *truth())
-    assert check.detected == ()
-    assert np.isnan(check.median_delay)
-    assert np.isnan(check.longest_delay)
-    assert check.largest_missed == 40.0
 
 
 def test_an_alarm_that_stays_on_detects_nothing_new():

@@ -120,6 +120,8 @@ def test_a_wrench_that_is_hardly_known_gives_no_axes_and_is_said():
     found = find_thresholds([compared("a", log.t, log.torque, wrench)], 1.0)
     assert (found.axes, found.force) == ((), ())
     assert {"axes-unknown", "wrench-seldom-known"} <= set(codes(found))
+    found = find_thresholds([free_log("a", 600.0, joints=4, axes=0)], 1.0)  # of few joints none
+    assert (len(found.joints), found.axes, found.force) == (4, (), ())
 
 
 def test_an_axis_wider_than_its_value_is_no_threshold_and_says_how_much_more():
@@ -179,11 +181,6 @@ def test_a_joint_that_never_moved_alarms_at_whatever_it_reads():
     assert found.joints[0].value == 0.0
     assert np.all(found.level("joints", still) == 0.0)
     assert np.all(found.level("joints", log) > 1.0)
-
-
-def test_an_arm_of_few_joints_has_no_axes():
-    found = find_thresholds([free_log("a", 600.0, joints=4, axes=0)], 1.0)
-    assert (len(found.joints), found.axes, found.force) == (4, (), ())
 
 
 # Block maxima, events and the exponential tail, against loops and exponential noise

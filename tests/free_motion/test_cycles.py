@@ -26,18 +26,17 @@ WITHIN = 2e-4
 """Required: the period to 0.02 %."""
 
 
-@pytest.mark.parametrize("period", [1.234, 3.7, 4.012])
-@pytest.mark.parametrize("rate", [30.0, 125.0, 1000.0])
-def test_period_below_the_sample_time(repeated, period, rate):
-    found = find_period(repeated(period=period, rate=rate))
-    assert found.seconds == pytest.approx(period, rel=WITHIN)
-
-
-@pytest.mark.parametrize("push", [0.02, 0.05])
-def test_pushes_do_not_pull_the_period(repeated, push):
-    """Pushes of 20 and 50 mrad, as a soft servo gives way, three times those of the paper's arm."""
-    found = find_period(repeated(push=push, cycles=5.0, rate=125.0))
-    assert found.seconds == pytest.approx(3.7, rel=WITHIN)
+@pytest.mark.parametrize(
+    "made",
+    [
+        *({"period": p, "rate": r} for p in (1.234, 3.7, 4.012) for r in (30.0, 125.0, 1000.0)),
+        # Pushes as a soft servo gives way, three times those of the paper's arm. [rad]
+        *({"push": push, "cycles": 5.0, "rate": 125.0} for push in (0.02, 0.05)),
+    ],
+)
+def test_period_below_the_sample_time(repeated, made):
+    found = find_period(repeated(**made))
+    assert found.seconds == pytest.approx(made.get("period", 3.7), rel=WITHIN)
 
 
 def test_a_last_cycle_that_lacks_a_few_samples_is_whole():

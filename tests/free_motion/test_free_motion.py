@@ -93,12 +93,9 @@ def test_a_cycle_inside_a_free_span_is_free(circle):
     assert (first.values["begin_s"], first.values["end_s"]) == (3.0, 7.0)
 
 
-def test_a_span_without_a_whole_cycle_leaves_the_cycles_to_be_found(circle):
-    motion = motion_of(circle, choice=FreeChoice(spans=((0.5, 2.0),)))
-    assert motion.free_cycles.numbers == (0,)  # as found: the first is the free one
-
-
 def test_spans_and_cycles_add_up(circle):
+    alone = motion_of(circle, choice=FreeChoice(spans=((0.5, 2.0),)))
+    assert alone.free_cycles.numbers == (0,)  # it holds no whole cycle: as found
     motion = motion_of(circle, choice=FreeChoice(spans=((0.0, 4.05),), cycles=(3,)))
     assert motion.free_cycles.numbers == (0, 2)
     own = circle.recording.t[motion.part.own]

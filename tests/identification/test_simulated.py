@@ -100,27 +100,17 @@ def test_another_trajectory_is_predicted_to_the_noise_floor(train, other, truth)
 
 
 @pytest.mark.slow
-def test_rounds_of_one_motion_are_reported_by_the_pull_they_do_without(train):
-    """On the arm that gives before it slides, most parameters are open and no fold sees it."""
-    rounds = simulate(load_scenario("ur5-circle", ["contacts=[]"]), SEED).recording
+@pytest.mark.parametrize(("settings", "most"), [([], 2.0), (MISMATCH, 1.25)])
+def test_rounds_of_one_motion_are_reported_and_hardly_spoil_the_profile(train, settings, most):
+    """Five rounds of one circle predict each other whatever the links are.
+
+    On the arm that gives before it slides most parameters are open: 12.8 N·m elsewhere with the
+    weakest pull, 1.33 with a table's, .84 with the profile. On one that sticks 5.0 with a pull of
+    .01, .79 with what is chosen, .70 with the profile.
+    """
+    rounds = simulate(load_scenario("ur5-circle", [*settings, "contacts=[]"]), SEED).recording
     found = identify([rounds], load_robot("ur5"), Task(method="base"), [train])
     (count,) = [r for r in found.remarks if r.code == "undetermined-base-parameters"]
     assert count.level == "caution"
     elsewhere = next(t for t in found.traces if t.role == "held-out")
-    # 12.8 N·m with the weakest pull, 1.33 with a table's, .84 with the profile itself
-    assert np.mean(elsewhere.rms) <= 2.0 * np.mean(elsewhere.before)
-
-
-def test_a_motion_that_repeats_itself_does_not_spoil_the_profile(train, other):
-    """Trained on five rounds of one circle, which predict each other whatever the links are."""
-    profile = load_robot("ur5")
-    found = identify([other], profile, Task(method="base"), [train])
-    (count,) = [r for r in found.remarks if r.code == "undetermined-base-parameters"]
-    assert count.level == "caution"
-    elsewhere = next(t for t in found.traces if t.role == "held-out")
-    # With a pull of .01 it was 5.0 N·m, seven times the profile's .70.
-    assert np.mean(elsewhere.rms) <= 1.25 * np.mean(elsewhere.before)
-    if np.mean(elsewhere.rms) > np.mean(elsewhere.before):
-        pytest.xfail(
-            "still worse elsewhere than the profile (.79 of .70 N·m), and a remark says so"
-        )
+    assert np.mean(elsewhere.rms) <= most * np.mean(elsewhere.before)

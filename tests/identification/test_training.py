@@ -8,8 +8,9 @@ import pytest
 
 from vftcli.identification import friction_fit, methods
 from vftcli.identification.clean_fit import CleanFit
-from vftcli.identification.friction_fit import PreslidingScore, fit_frictions
+from vftcli.identification.friction_fit import PreslidingScore, all_residuals, fit_frictions
 from vftcli.identification.links import stack
+from vftcli.identification.shapes import bent
 from vftcli.identification.training import (
     moving_joints,
     prepare,
@@ -41,6 +42,16 @@ def test_a_joint_moves_for_a_second_and_reverses_for_a_tenth_of_it(prepared):
     assert moving_joints([log, log])[0].tolist() == [True, True, True, True, False, True]
     with pytest.raises(IdentificationError, match="no joint moves faster than"):
         moving_joints([prepared(T, dq=dq[:, 2:5])])
+
+
+def test_residuals_are_cut_apart_log_by_log(recording, arm):
+    logs = [recording, recording.between(0.0, 7.0)]
+    data = prepare_training(logs, arm)
+    fits = fit_frictions(data)
+    first, second = all_residuals(data, fits)
+    assert (len(first), len(second)) == tuple(log.samples for log in data.logs)
+    whole = fits[3].fit.residual
+    np.testing.assert_array_equal(np.concatenate([first[:, 3], second[:, 3]]), whole)
 
 
 def test_drive_constants_need_currents(recording, arm):
@@ -112,6 +123,18 @@ def test_what_was_fitted_is_remarked_on_in_its_units(data, prepared):
         ("presliding-length", [1.0, [0.0, 1.0], [1.0, 0.5]]),
         ("friction-by-temperature", [[0.9, 1.2]]),
     ]
+
+
+def test_points_of_a_line_are_listed_beside_the_profile_s(data):
+    arm, sd = load_robot("ur5"), np.array([0.29, 0.31, 0.1])
+    old, x = data._replace(robot=arm), np.array([1.0, -1.0, 0.3])
+    friction, numbers = methods.identified_friction(old, 1, bent(2.0), x, sd, "base")
+    assert friction.confidence == (
+        "identified (base) from recording (sha256 unknown); standard deviations 0.29, 0.31, 0.1"
+    )
+    found = [(n.joint, n.value, n.sd, n.profile, n.determined) for n in numbers]
+    rows = zip([2] * 3, x, sd, arm.friction[1].torques[:3], [True, False, False], strict=True)
+    assert found == list(rows)
 
 
 def test_a_current_that_falls_with_the_torque_is_refused(data):

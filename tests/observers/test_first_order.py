@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from made_terms import random_walk, run_in_blocks
 
-from vftcli.observers import FilteredDynamicsObserver, MomentumObserver
+from vftcli.observers import FilteredDynamicsObserver, KalmanObserver, MomentumObserver
 from vftcli.observers.table import Setup, build_observers
 from vftcli.readers.reading import read
 from vftcli.robots import load_robot
@@ -122,9 +122,14 @@ def test_a_gain_that_is_not_positive_is_refused(gain):
         FilteredDynamicsObserver(omega=gain)
 
 
+def kalman(as_printed):
+    # (44) as printed has no pieces.
+    return KalmanObserver(discretisation="fe" if as_printed else "zoh", as_printed=as_printed)
+
+
 @pytest.mark.parametrize("as_printed", [False, True])
 @pytest.mark.parametrize("jitter", [0.0, 0.3])
-@pytest.mark.parametrize("observer", [FilteredDynamicsObserver, MomentumObserver])
+@pytest.mark.parametrize("observer", [FilteredDynamicsObserver, MomentumObserver, kalman])
 def test_blocks_of_a_log_give_the_whole_log_s_estimate(observer, jitter, as_printed):
     log, fdo = random_walk(PIECE + 900, jitter, joints=2), observer(as_printed=as_printed)
     whole = fdo.estimate(log).tau

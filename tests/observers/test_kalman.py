@@ -18,7 +18,6 @@ from vftcli.observers.kalman_model import (
 from vftcli.observers.smoother import gain_sequence
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.external_torque import DynamicsTerms
-from vftcli.signals.steady_filter import PIECE
 
 R = np.array([0.5, 0.5, 0.5, 1.3, 1.3, 1.3])  # the paper's UR5 values, Sec. IV-A
 Q_P = np.array([0.01, 0.01, 0.01, 0.02, 0.02, 0.02])
@@ -200,24 +199,6 @@ def test_half_the_power_passes_at_the_bandwidth(scheme):
     s, omega = 2j * np.pi * tuning.bandwidth, tuning.omega_n
     response = omega**2 / (s**2 + 2.0 * tuning.zeta * omega * s + omega**2)
     np.testing.assert_allclose(np.abs(response) ** 2, 0.5, rtol=1e-12)  # rounding
-
-
-@pytest.mark.parametrize("as_printed", [False, True])
-@pytest.mark.parametrize("jitter", [0.0, 0.2])
-def test_blocks_of_a_log_give_the_whole_log_s_estimate(jitter, as_printed):
-    # (44) as printed has no pieces.
-    scheme = "fe" if as_printed else "zoh"
-    observer, log = paper(scheme, as_printed=as_printed), random_walk(PIECE + 900, jitter)
-    whole = observer.estimate(log).tau
-    np.testing.assert_array_equal(run_in_blocks(observer, log, PIECE)[0], whole)
-    for size in (37, 5000):
-        short = slice(0, 400 if size == 37 else None)
-        part = DynamicsTerms(
-            t=log.t[short], p=log.p[short], mu=log.mu[short], log_clock=log.clock
-        )
-        # the same sums in another order; some 100 N·m
-        found = run_in_blocks(observer, part, size)[0]
-        np.testing.assert_allclose(found, whole[short], rtol=0, atol=1e-11)
 
 
 SAMPLES = 3000

@@ -231,6 +231,7 @@ def noisy(values: np.ndarray, seed: int) -> np.ndarray:
         (OURS.values, "fits base axes, force on the robot"),
         (-OURS.values, "fits base axes with turned sign"),
         (-PUSH, "fits flange axes with turned sign"),
+        (OURS.values[:, [0, 2, 1, 3, 5, 4]] * [1, 1, -1, 1, 1, -1], "+x +z −y"),
     ],
 )
 def test_a_vendors_frame_and_sign_are_reported(theirs, words):
@@ -251,13 +252,6 @@ def test_a_fit_that_is_the_same_signal_is_reported_to_be_derived():
     assert (fits.code, derived.code) == ("log-wrench-fits", "log-wrench-derived")
     assert fits.values["gain"] == pytest.approx(2.0)
     assert fits.values["stated"] == "frame not stated"
-
-
-def test_swapped_axes_are_named():
-    swapped = OURS.values[:, [0, 2, 1, 3, 5, 4]] * [1, 1, -1, 1, 1, -1]
-    (remark,) = remarks(noisy(swapped, 3))
-    assert remark.code == "log-wrench-fits-other-axes"
-    assert remark.values["axes"] == "+x +z −y"
 
 
 def test_what_resembles_nothing_is_reported_and_zeros_in_part():
