@@ -44,7 +44,6 @@ def test_constant_parameters_reproduce_the_second_order_response():
 
 
 def start(x: float, axis: int = 0) -> np.ndarray:
-    """A deviation of one axis."""
     return np.where(np.arange(6) == axis, x, 0.0)
 
 

@@ -59,7 +59,6 @@ def panda(mode: str = "hard", hysteresis: float = 0.0) -> Admittance:
 
 
 def column(*values: float) -> np.ndarray:
-    """A force along x."""
     force = np.zeros((len(values), 6))
     force[:, 0] = values
     return force

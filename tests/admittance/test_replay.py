@@ -46,14 +46,12 @@ def push(force: float = 24.0, axis: int = 1, length: float = 14.0) -> Force:
 
 
 def run(force: Force, *assignments: str, alphas: tuple[float, ...] = ()) -> replay.Replay:
-    """Replay on the UR5."""
     p = parameters(*assignments)
     source = fact("force-of-sensor", frame="a push")
     return replay.replay(*force, UR5, controllers(p, alphas=alphas), source=source)
 
 
 def codes(found: replay.Replay) -> set[str]:
-    """The codes of what a replay has to say."""
     assert all(str(remark) for remark in found.remarks)  # the catalogue has words for each
     return {remark.code for remark in found.remarks}
 

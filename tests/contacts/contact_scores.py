@@ -42,7 +42,6 @@ def touched(wrench: Array) -> np.ndarray:
 
 
 def true_contacts(t: Array, wrench: Array) -> list[TrueContact]:
-    """The contacts of a true wrench (M, 6)."""
     force = np.linalg.norm(wrench[:, :3], axis=1)
     found = []
     for start, stop in intervals(t, touched(wrench), gap=GAP):

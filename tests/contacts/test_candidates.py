@@ -27,7 +27,6 @@ def joints_of(d: Array) -> tuple[Blocks, Array]:
 
 
 def touched_blocks(log: Blocks, jacobian: Array) -> Mask:
-    """Blocks that the two-state filter calls contact."""
     courses = error_process(noise(), log), error_process(noise(), turned_round(log))
     return filtered_contacts(log, courses, jacobian)
 

@@ -123,7 +123,6 @@ def test_numbers_that_are_not_finite_are_refused():
 
 
 def ur10e(logs: Path, name: str) -> Recording:
-    """A real log of the UR10e."""
     return read(logs / "ur10e" / name, columns=UR10E)
 
 

@@ -59,7 +59,6 @@ def counts(path: Path, robot: str) -> dict[float, CountedAlarms]:
 
 
 def failures(found: list[dict[float, CountedAlarms]]) -> list[str]:
-    """The bars that do not hold."""
     wrong = []
     for one in found:
         often, rare = one[60.0], one[12.0]

@@ -108,13 +108,11 @@ def edited(signal: Array, joint: int, values: Any) -> Array:
 
 
 def turned(table: Table, signals: tuple[str, ...], joint: int = 2) -> Table:
-    """Some signals of one joint with the other sign."""
     sign = 1.0 - 2.0 * (np.arange(1, table.joints + 1) == joint)
     return replace(table, **{name: sign * getattr(table, name) for name in signals})
 
 
 def swapped(table: Table, signals: tuple[str, ...], pair: tuple[int, int] = (2, 3)) -> Table:
-    """Some of the signals that are there, two joints' columns exchanged."""
     first, second = pair
     order = np.arange(table.joints)
     order[[first - 1, second - 1]] = second - 1, first - 1
@@ -193,7 +191,6 @@ def saturated(table: Table, joint: int = 2, share: float = 0.6) -> Table:
 
 
 def late(table: Table, signal: str, samples: int) -> Table:
-    """A signal `samples` later; its first value stands until then."""
     rows = np.maximum(np.arange(len(table.t)) - samples, 0)
     return replace(table, **{signal: getattr(table, signal)[rows]})
 
@@ -340,7 +337,6 @@ FAULTS: Mapping[str, Fault] = {
 
 
 def simulated(scenario: str, seconds: float, robot: str) -> Table:
-    """A simulated log, a Panda's with the vendor's estimate."""
     made = simulate(load_scenario(scenario, [f"duration={seconds:g}"]), seed=3).recording
     return table_from(made, robot)
 

@@ -118,7 +118,6 @@ def frozen(table: Table, seconds: float) -> Table:
 
 
 def table_with_rows(table: Table, rows: Array) -> Table:
-    """The values of other rows under the stamps that are there."""
     return replace(table.selected(rows), t=table.t, sound_t=table.sound_t)
 
 

@@ -122,8 +122,6 @@ def recording_of(log: SoundLog, folder: Path) -> Recording:
 
 
 def panda_exciting(folder: Path) -> Recording:
-    """The Panda log of four text files, repeated stamps dropped."""
-
     def numbers(name: str) -> Array:
         return np.loadtxt(folder / f"exciting_traj_{name}.txt").reshape(-1, 7)
 

@@ -49,8 +49,6 @@ def glued(signals: Signals) -> None:
 
 
 def packets(value: float) -> Any:
-    """Three packets that hold one value throughout."""
-
     def plant(signals: Signals) -> None:
         for name in ("q", "dq", "current"):
             changed(name, 3, lambda x: 0 * x + value)(signals)
@@ -59,7 +57,6 @@ def packets(value: float) -> Any:
 
 
 def frozen(signals: Signals) -> None:
-    """One packet for three seconds."""
     for name in ("q", "dq", "current"):
         signals[name][AT : AT + 375] = signals[name][AT]
 

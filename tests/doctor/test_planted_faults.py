@@ -57,8 +57,6 @@ REFUSED = {
 
 @pytest.fixture(scope="module")
 def table_of(request):
-    """Opens a sound log; the real one where VFT_LOGS is set."""
-
     def opened(log: str) -> Table:
         if log in SCENARIOS:
             return simulated(*SCENARIOS[log], robot=log)

@@ -24,8 +24,6 @@ HARM = {"gmo": 0.25, "best": 0.6, "thresholds": 0.6}
 
 
 class Answer(NamedTuple):
-    """What comes of a log."""
-
     t: Array  # in the sound log's time (T,) [s]
     torques: Mapping[str, Array]  # by observer; of thresholds one row (T, n) each [N·m]
     said: frozenset[tuple[str, str, tuple[int, ...]]]  # level, code, joints

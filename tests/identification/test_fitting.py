@@ -200,7 +200,6 @@ def weighed(mass):
 
 
 def hardly(share):
-    """So much of the motion is left."""
     moved = weighed(2.0)
     return replace(moved, q=moved.q[0] + share * (moved.q - moved.q[0]), dq=share * moved.dq)
 

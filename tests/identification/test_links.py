@@ -73,7 +73,6 @@ def test_triangles_are_the_weighted_equations(log):
 
 
 def frictionless(name, rotor):
-    """The unknowns of a robot of this name without friction."""
     chain = load_robot(name).chain
     return ParameterColumns(chain, rotor, (Shape(()),) * chain.joints)
 

@@ -20,7 +20,6 @@ from vftcli.signals.errors import IdentificationError
 
 @pytest.fixture(scope="module")
 def ur10e(logs):
-    """Logs of the UR10e by name, each read once."""
     kept = {}
 
     def open_log(name):

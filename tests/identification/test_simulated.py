@@ -47,7 +47,6 @@ def other():
 
 @pytest.fixture(scope="module")
 def truth() -> Robot:
-    """The simulated arm as a robot."""
     arm, _ = build(load_scenario("free-excitation", [STICKS]), SEED)
     profile, true = load_robot("ur5"), arm.true
     friction = []

@@ -32,7 +32,6 @@ FLANGE = link_poses(UR5.chain, Q).rotation[:, -1]
 
 
 def log(frame: WrenchFrame | None, wrench: np.ndarray = READ) -> Recording:
-    """A log of 30 poses."""
     return Recording(t=np.arange(30.0), q=Q, wrench=wrench, wrench_frame=frame)
 
 
@@ -122,7 +121,6 @@ def test_the_answers_frame_undoes_the_logs(frame):
 
 
 def codes(frame: WrenchFrame | None, mounting: Mounting) -> list[str]:
-    """The codes of what had to be assumed."""
     return [remark.code for remark in logged_wrench(log(frame), UR5.chain, mounting).remarks]
 
 
