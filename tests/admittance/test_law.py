@@ -88,16 +88,8 @@ def random_controllers(count: int, limit: float, rng: np.random.Generator) -> tu
         alpha, xi = rng.uniform(0.5, 3.0, 6), rng.uniform(0.3, 3.0, 6)
         for row in (mass, stiffness, alpha, xi):
             row[3:] = row[3]
-        p = law.Admittance(
-            mass=mass,
-            damping=np.ones(6),
-            stiffness=stiffness,
-            alpha=alpha,
-            xi=xi,
-            threshold=np.ones(6),
-            speed_limit=limit,
-            period=0.008,
-        )
+        own = {"mass": mass, "stiffness": stiffness, "alpha": alpha, "xi": xi}
+        p = replace(UR5, **own, speed_limit=limit)
         bound = np.sqrt(mass / (2.0 * stiffness)) / alpha
         x = rng.uniform(-1.0, 1.0, 6) * bound
         axis = rng.standard_normal(3)

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from test_thresholds import compared
 
 from vftcli.contacts.threshold_check import check_contacts, compared_signals
 from vftcli.contacts.thresholds import ComparedSignals, SignalThreshold, Thresholds
@@ -15,7 +16,6 @@ from vftcli.robots.run import Run
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import RobotError
 from vftcli.signals.external_torque import ExternalTorque
-from vftcli.signals.recording import Recording, Source
 from vftcli.signals.wrench import Wrench, WrenchFrame
 from vftcli.wrench.solvers import VirtualSensor
 
@@ -26,19 +26,10 @@ LAG = 0.1
 """Of the estimate behind the truth. [s]"""
 
 
-def one(value: float) -> SignalThreshold:
-    return SignalThreshold(value, (value, value), 1.0, "free", None)
-
-
 def limits(torque: float, force: float) -> Thresholds:
-    return Thresholds(
-        rate=1.0,
-        joints=(one(torque),) * 6,
-        axes=(one(force),) * 6,
-        force=(one(force),),
-        of_vendor=True,
-        logged_wrench=True,
-    )
+    joint, axis = (SignalThreshold(x, (x, x), 1.0, "free", None) for x in (torque, force))
+    signals = {"joints": (joint,) * 6, "axes": (axis,) * 6, "force": (axis,)}
+    return Thresholds(rate=1.0, **signals, of_vendor=True, logged_wrench=True)
 
 
 def steps(delay: float) -> Array:
@@ -52,14 +43,7 @@ def estimated(extra: Array | float = 0.0) -> ComparedSignals:
     torque[:, 1] = 0.5 * steps(LAG)
     torque[:, 0] += extra
     wrench[:, 2] = steps(LAG)
-    return ComparedSignals(
-        recording=Recording(t=T, q=torque, source=Source(label="pushes")),
-        torque=torque,
-        wrench=wrench,
-        of_vendor=True,
-        logged_wrench=True,
-        frame="base axes",
-    )
+    return compared("pushes", T, torque, wrench)
 
 
 def truth() -> tuple[ExternalTorque, Wrench]:

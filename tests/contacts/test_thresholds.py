@@ -35,15 +35,10 @@ def free_log(name, seconds, scale=1.0, *, seed=0, joints=6, axes=6) -> ComparedS
 
 def compared(name: str, t: Array, torque: Array, wrench: Array) -> ComparedSignals:
     """Signals as a robot of its own estimate has them."""
-    recording = Recording(t=t, q=np.zeros(torque.shape), source=Source(label=name))
-    return ComparedSignals(
-        recording=recording,
-        torque=torque,
-        wrench=wrench,
-        of_vendor=True,
-        logged_wrench=True,
-        frame="base axes" if wrench.shape[1] else "",
-    )
+    log = Recording(t=t, q=np.zeros(torque.shape), source=Source(label=name))
+    told = {"of_vendor": True, "logged_wrench": True}
+    told["frame"] = "base axes" if wrench.shape[1] else ""
+    return ComparedSignals(recording=log, torque=torque, wrench=wrench, **told)
 
 
 def codes(thresholds: Thresholds) -> list[str]:

@@ -19,7 +19,7 @@ from vftcli.identification.training import (
     stride,
     usable_samples,
 )
-from vftcli.robots import JointFriction, load_robot
+from vftcli.robots import JointFriction, Payload, load_robot
 from vftcli.robots.kernels import chain_parameters, torque_regressor
 from vftcli.signals.errors import IdentificationError
 from vftcli.signals.recording import Recording
@@ -160,6 +160,26 @@ def test_a_wrong_drive_constant_scales_friction_and_rotor(recording, arm):
     coulomb = {n.joint: n for n in found.numbers if n.parameter == "coulomb"}
     assert coulomb[2].value == pytest.approx(4.0, rel=0.05)
     assert found.robot.torque_constant[1] == pytest.approx(K[2].value, rel=1e-6)
+
+
+def test_the_whole_arm_starts_from_the_profile_and_the_fits(data, arm):
+    fits = fit_frictions(data)
+    layout, start = methods.initial_columns(data, fits)
+    np.testing.assert_array_equal(start[:60], chain_parameters(arm.loaded_chain))
+    assert start[60 + 1] == fits[1].fit.values[len(fits[1].shape.terms)]
+    np.testing.assert_array_equal(start[layout.frictions[2]], fits[2].fit.values[:-1])
+    held = {j: fit for j, fit in fits.items() if j}
+    layout, start = methods.initial_columns(data, held)
+    assert layout.shapes[0].terms == ("coulomb", "viscous", "offset")
+    np.testing.assert_array_equal(start[layout.frictions[0]], [4.0, 6.0, 0.5])
+    np.testing.assert_allclose(start[60], arm.chain.rotor_inertia[0])
+    # a vector becomes a robot without its payload
+    load = Payload(mass=1.0, com=np.zeros(3), inertia=np.zeros((3, 3)))
+    start[10], start[60:66] = 9.5, 2.5
+    robot = methods.with_vector(arm.with_payload(load), layout, start, arm.friction)
+    assert robot.payload is None
+    np.testing.assert_array_equal(robot.chain.rotor_inertia, 2.5)
+    np.testing.assert_allclose(chain_parameters(robot.chain), start[:60], atol=1e-9)
 
 
 @pytest.mark.slow

@@ -33,14 +33,8 @@ def dense_torque(steps: list[Any]) -> tuple[np.ndarray, np.ndarray]:
 
 
 def paper(scheme: str, convention: str = "density", **more: object) -> KalmanObserver:
-    return KalmanObserver(
-        discretisation=scheme,
-        r_diag=R,
-        q_p_diag=Q_P,
-        q_tau_diag=Q_TAU,
-        noise_convention=convention,
-        **more,
-    )
+    own = {"r_diag": R, "q_p_diag": Q_P, "q_tau_diag": Q_TAU, "noise_convention": convention}
+    return KalmanObserver(discretisation=scheme, **own, **more)
 
 
 @pytest.mark.slow

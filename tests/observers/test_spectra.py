@@ -72,14 +72,9 @@ def test_no_segment_reaches_across_a_gap():
 
 def flat_spectra(free: float = 1.0, loaded: float = 3.0) -> Spectra:
     """Eleven bins of .5 Hz, of one density each: so slow that nothing is capped."""
+    quiet, loud = (np.full((11, 1), density) for density in (free, loaded))
     f = np.linspace(0.0, 5.0, 11)
-    return Spectra(
-        frequency=f,
-        free=np.full((11, 1), free),
-        loaded=np.full((11, 1), loaded),
-        step=0.05,
-        segments=(1, 1),
-    )
+    return Spectra(frequency=f, free=quiet, loaded=loud, step=0.05, segments=(1, 1))
 
 
 @pytest.mark.parametrize(

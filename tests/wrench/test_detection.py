@@ -159,14 +159,8 @@ def test_stiction_at_rest_deafens_no_reference():
     """1 N·m in motion, of half the samples or of one; a joint at rest has its floor."""
     t = np.arange(200) * 0.01
     moving = np.arange(200)[:, None] < [100, 1, 0]
-    one = ExternalTorque(
-        name="two-cycle",
-        t=t,
-        tau=np.zeros((200, 3)),
-        sd=np.where(moving, 1.0, 5.0),
-        floor=np.array([np.sqrt(13.0), 5.0, 5.0]),
-        moving=moving,
-    )
+    errors = {"sd": np.where(moving, 1.0, 5.0), "floor": np.array([np.sqrt(13.0), 5.0, 5.0])}
+    one = ExternalTorque(name="x", t=t, tau=np.zeros((200, 3)), moving=moving, **errors)
     np.testing.assert_allclose(floor_in_motion(one), [1.0, 1.0, 5.0])
 
 

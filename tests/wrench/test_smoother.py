@@ -20,7 +20,6 @@ from vftcli.signals.arrays import Array
 from vftcli.signals.errors import RobotError
 from vftcli.signals.external_torque import DynamicsTerms
 from vftcli.signals.wrench import AXES
-from vftcli.wrench.model_error import TorqueNoise
 from vftcli.wrench.smoother import (
     BLOCK,
     GRID,
@@ -290,15 +289,7 @@ NOTHING = np.zeros((COUNT, 6))
 BLOCKS = Blocks(
     T, np.full(COUNT, SECONDS), NOTHING, NOTHING, np.ones((COUNT, 6)), np.ones(COUNT, dtype=bool)
 )
-NOISE = TorqueNoise(
-    white=np.full(6, 0.1),
-    variance=np.full(6, 4.0),
-    time=np.full(6, 0.5),
-    dry=np.zeros(6),
-    seen=np.ones(6, dtype=bool),
-    at_rest=np.full(6, 5.0),
-    pushed=np.full(6, 1.44 * 9.0),
-)
+NOISE = noise(6)._replace(variance=np.full(6, 4.0), time=np.full(6, 0.5))
 PRIOR = WrenchPrior(2.0, 30.0)
 
 
