@@ -33,6 +33,7 @@ from planted_faults import (
     with_more_torque,
 )
 from planted_spans import picked_up
+from seed_containers import aloha
 
 from vftcli.readers.reading import read
 from vftcli.robots import PROFILES
@@ -295,8 +296,7 @@ ROWS = [
     Row("effort-sign-by-work", unnamed(turned_and_unknown), "columns"),
     Row("effort-is-current", lambda _: ["inspect", shared(
         "samples/reach/ros2_ur_effort_full_torque")], "columns"),
-    Row("arm-side-chosen", lambda _: ["inspect", shared(
-        "samples/reach/aloha_episode_0.hdf5")], "arm", "right"),
+    Row("arm-side-chosen", lambda f: ["inspect", aloha(f / "episode_0.hdf5")], "arm", "right"),
     Row("no-profile", unnamed(lambda t: replace(
         t, q=t.q[:, :5], dq=t.dq[:, :5], effort=t.effort[:, :5])), "robot", arm_of_five),
     Row("free-by-the-fit", cut(4.5, 20, *PUSHED[:3], "--json", *NO_LIST), "free", free_log),

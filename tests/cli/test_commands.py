@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import polars as pl
 import pytest
-from example_logs import BEARING, CIRCLE, EPISODES, FIXTURES, TAPS
+from example_logs import BEARING, CIRCLE, EPISODES, TAPS
 from typer.testing import CliRunner
 
 from vftcli.cli import make_app
@@ -33,8 +33,6 @@ def test_release_rows(run) -> None:
     assert (code, err) == (0, "")
     assert [row["alpha"] for row in rows] == [None, 1.0, 1.3, 1.6, 1.9]
     assert [row["controller"] for row in rows] == ["traditional"] + ["variable"] * 4
-    needed = {"controller", "alpha", "xi", "axis", "peak", "time_to_peak_s", "overshoot"}
-    assert needed | {"return_10_s", "return_2_s"} <= set(rows[0])
     # science of the issue, 3 %
     times = [row["return_2_s"] for row in rows]
     assert times == pytest.approx([4.84, 3.14, 2.30, 1.74, 1.35], rel=0.03)
@@ -58,9 +56,6 @@ def test_log_becomes_a_folder(run, refused, tmp_path: Path) -> None:
     files = {"index.html", "motion.parquet", "comparison.csv", "comparison.json", "run.json"}
     assert {p.name for p in folder.iterdir()} == files
     page = (folder / "index.html").read_text("utf-8")
-    for words in ("Force and motion over time", "What differs from the paper", "F_tsd"):
-        assert words in page
-    assert "± threshold" in page
     assert not re.findall(r"(?:src|href)=[\"']?(?:https?:)?//", page)  # opens offline
     record = json.loads((folder / "run.json").read_text("utf-8"))
     assert record["parameters"]["threshold"] == [4, 4, 15, 2, 2, 2]
@@ -74,7 +69,7 @@ def test_log_becomes_a_folder(run, refused, tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_estimates_and_truth_are_forces_too(run, refused, tmp_path: Path) -> None:
+def test_estimates_and_truth_are_forces_too(run, tmp_path: Path) -> None:
     assert run("estimate", *PANDA[1:], "-q", "-o", tmp_path)[0] == 0
     estimates = ("admit", tmp_path / "estimates.parquet", "--robot", "panda")
 
@@ -86,9 +81,6 @@ def test_estimates_and_truth_are_forces_too(run, refused, tmp_path: Path) -> Non
     truth = rows(*PANDA, "--set", f"admittance.force=file:{BEARING}.truth.parquet")
     peaks = {row["axis"]: row["peak"] for row in truth if row["controller"] == "variable"}
     assert peaks["x"] > 0.05  # the guiding hand pulls along +x with 7 N
-    error = refused(*estimates, "--observer", "kfo")
-    assert "holds no estimates of 'kfo'; it holds best, fdo, gmo" in error
-    assert "does not settle which arm it is of; name it with --robot" in refused(*estimates[:2])
 
 
 # `vftcli annotate` as a user types it.
@@ -147,32 +139,17 @@ def test_the_answer_is_on_stdout_and_nothing_is_written(run, here: Path) -> None
 
 
 def test_a_reference_is_one_more_line(run) -> None:
-    words = (
-        "contacts",
-        FIXTURES / "ur5_circle.csv",
-        "--robot",
-        "ur5",
-        "--reference",
-        "two-cycle",
-    )
-    code, out, _ = run(*words)
+    code, out, _ = run("contacts", CIRCLE, "--robot", "ur5", "--reference", "two-cycle")
     assert (code, "no reference" in out) == (0, False)
     assert "Against two-cycle without J5 (own error " in out
 
 
-def test_a_free_part_that_is_not_there_is_refused(refused) -> None:
-    assert "free part" in refused("contacts", TAPS, "--robot", "ur5", "--free", "90:95")
-
-
-def test_estimates_are_not_read_as_a_log(run, refused, tmp_path: Path) -> None:
+def test_an_estimate_s_record_has_the_list_of_contacts(run, tmp_path: Path) -> None:
     words = ("--robot", "ur5", "--free", "0.3:4")
     assert run("estimate", TAPS, *words, "-q", "-o", tmp_path)[0] == 0
     record = json.loads((tmp_path / "run.json").read_text("utf-8"))
     fresh = json.loads(run("contacts", TAPS, *words, "--json")[1])
     assert record["contacts"]["contacts"] == fresh["contacts"]
-    for command in (("contacts",), ("compare", "--reference", "zero")):
-        error = refused(*command, tmp_path / "estimates.parquet")
-        assert "holds estimates, not what the drives measured; give the log" in error
 
 
 # `vftcli identify` at the command line.
@@ -203,9 +180,8 @@ def test_a_log_becomes_a_robot_that_estimate_uses(run, excitation, here: Path) -
 @pytest.mark.slow
 @pytest.mark.usefixtures("here")
 def test_a_fit_says_without_being_asked_that_something_touched_the_arm(run) -> None:
-    code, _, err = run(
-        "identify", CIRCLE, "--robot", "ur5", "--method", "friction", "-o", "r.toml"
-    )
+    words = ("--robot", "ur5", "--method", "friction", "-o", "r.toml")
+    code, _, err = run("identify", CIRCLE, *words)
     assert code == 0
     (said,) = [line for line in err.splitlines() if "suspected contacts" in line]
     assert said.endswith("are left out of the fit")
@@ -261,29 +237,18 @@ def test_inspect_in_words_and_strict_fails_on_warnings(run, table: Path) -> None
         assert (code, err) == (1, f"{said} (--strict)\n")
 
 
-def test_a_log_of_another_number_of_joints_is_refused_as_by_every_command(run) -> None:
-    log = Path(__file__).parents[2] / "fixtures" / "panda_bearing.csv"
-    for command in ("inspect", "contacts"):
-        code, out, err = run(command, log, "--robot", "ur5")
-        assert (code, out, err.count("\n")) == (1, "", 1)
-        assert "the log has 7 joints but robot 'ur5' has 6; choose another with --robot" in err
-
-
 @pytest.mark.slow
 def test_several_logs_that_fill_the_screen_have_a_line_each(run) -> None:
-    logs = [FIXTURES / "ur5_circle.csv", FIXTURES / "panda_bearing.csv"] * 3
-    code, out, err = run("inspect", *logs, "--robot", "ur5")
+    robot = ("--robot", "ur5")
+    code, out, err = run("inspect", *[CIRCLE, BEARING] * 3, *robot)
     assert code == 3
     assert err.count("panda_bearing.csv left out: the log has 7 joints") == 3
     assert len(out.splitlines()) <= 40
     assert out.count("ur5_circle.csv") >= 3
-    code, out, _ = run("inspect", *[FIXTURES / "ur5_circle.csv"] * 4, "--robot", "ur5")
+    code, out, _ = run("inspect", *[CIRCLE] * 4, *robot)
     assert (code, out.splitlines()[-1]) == (0, "Each log by itself: --details")
     assert out.count("ur5_circle.csv: log health: sound") == 4
-    words = ("--robot", "ur5", "--details")
-    assert (
-        run("inspect", *[FIXTURES / "ur5_circle.csv"] * 4, *words)[1].count("longest step") == 4
-    )
+    assert run("inspect", *[CIRCLE] * 4, *robot, "--details")[1].count("longest step") == 4
 
 
 def test_names_with_control_characters_are_shown_harmlessly(run, tmp_path: Path) -> None:
@@ -374,12 +339,11 @@ def test_two_free_logs_are_counted_against_each_other(free: Path, pushed: Path, 
 
 @pytest.mark.slow
 def test_a_simulated_log_is_checked_against_the_truth_beside_it(run, refused) -> None:
-    log = FIXTURES / "panda_bearing.csv"
     words = ("--robot", "panda", "--rate", 60, "--anyway")
-    error = refused("thresholds", log, "--robot", "panda")
+    error = refused("thresholds", BEARING, "--robot", "panda")
     assert "looks touched: 2" in error  # by 20 N and more
     assert "take it all with --anyway" in error
-    code, out, err = run("thresholds", log, *words, "--check", log)
+    code, out, err = run("thresholds", BEARING, *words, "--check", BEARING)
     assert code == 0, err
     assert "of 3 contacts detected" in out
     assert "contacts are those of the reference file:panda_bearing.csv.truth.parquet" in err

@@ -207,8 +207,8 @@ def test_what_is_found_of_an_arm_has_its_name(refused, here: Path) -> None:
     robot = here / "my arm.toml"
     robot.write_text(PROFILES["ur5"].read_text("utf-8").replace('"ur5"', '"a/b c"', 1), "utf-8")
     Path("my_a_b_c.toml").touch()
-    error = refused("identify", TAPS, "--robot", robot, "--method", "gains")
-    assert error.startswith("error: my_a_b_c.toml exists; ")
+    words = ("identify", TAPS, "--robot", robot, "--method", "gains")
+    assert refused(*words).startswith("error: my_a_b_c.toml exists; ")
 
 
 # No command writes over what it reads, with --force or without, under whatever name.
@@ -318,14 +318,10 @@ def test_a_payload_pair_of_equal_names_is_scored_on_the_log_without_load(run, he
     assert found == {"mass", "com_x", "com_y", "com_z"}
 
 
-@pytest.mark.parametrize(
-    "words",
-    [("compare", "--reference", "zero"), ("identify", "--method", "payload", "-o", "r.toml")],
-)
-def test_a_copy_of_the_log_is_no_free_run(refused, pair: list[Path], here, words) -> None:
+def test_a_copy_of_the_log_is_no_motion_without_the_load(refused, pair: list[Path], here) -> None:
     copy = shutil.copy(pair[0], "copy.csv")
-    error = refused(*words, pair[0], "--robot", "ur5", "--free", copy)
-    assert "are one run" in error
+    words = ("--robot", "ur5", "--method", "payload", "-o", "r.toml", "--free", copy)
+    assert "are one run" in refused("identify", pair[0], *words)
     assert {path.name for path in here.iterdir()} == {"a", "b", "copy.csv"}
 
 
@@ -366,22 +362,6 @@ def test_all_are_logs_of_their_own(run, episodes: Path) -> None:
     assert (code, "--episode K" in err) == (0, False)
     names = [each["recording"] for each in json.loads(out)["logs"]]
     assert names == ["ur5.arrow episode 0", "ur5.arrow episode 1"]
-
-
-def test_a_command_of_one_log_takes_no_all(refused, episodes: Path) -> None:
-    assert "name one: --episode K" in refused("inspect", episodes, "--episode", "all")
-
-
-@pytest.mark.usefixtures("here")
-def test_inspect_describes_the_left_arm_and_names_both(run, refused, tmp_path: Path) -> None:
-    pytest.importorskip("h5py", reason="h5py, the extra hdf5, is not installed")
-    from seed_containers import aloha
-
-    path = aloha(tmp_path / "episode_0.hdf5")
-    code, out, _ = run("inspect", path)
-    assert (code, "this is the left one: --arm left|right" in out) == (0, True)
-    error = refused("convert", path, "-o", "x.csv")
-    assert "say which with --arm left or --arm right" in error
 
 
 # One envelope for machines: how every command's JSON, `run.json`, `contacts.json` begin.

@@ -105,16 +105,6 @@ def test_force_leaves_no_declared_file_of_an_earlier_run(tmp_path: Path) -> None
     assert texts(tmp_path) == {"mine.txt": "old", "run.json": "new"}
 
 
-@pytest.mark.parametrize(
-    ("place", "words"), [("file", "is a file"), ("file/out", "cannot be written")]
-)
-def test_at_or_below_a_file_there_is_no_folder(tmp_path: Path, place: str, words: str) -> None:
-    (tmp_path / "file").write_text("")
-    with pytest.raises(OutputError, match=words), OutputFolder(tmp_path / place):
-        pytest.fail("the block ran")
-    assert texts(tmp_path) == {"file": ""}
-
-
 def test_an_error_of_the_system_becomes_one_line(tmp_path: Path) -> None:
     out = OutputFolder(tmp_path / "out")
     with pytest.raises(OutputError, match="no space left on device") as caught, out:
