@@ -72,15 +72,12 @@ def test_errors_against_zero_name_the_longest_span_without_contact() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("name", "count"),
-    [
-        ("free_14harm.csv", 0),
-        ("jointwise_2.csv", 0),
-        ("load_14harm.csv", 0),
-        ("push_pose.csv", 1),
-    ],
-)
+@pytest.mark.parametrize(("name", "count"), [
+    ("free_14harm.csv", 0),
+    ("jointwise_2.csv", 0),
+    ("load_14harm.csv", 0),
+    ("push_pose.csv", 1),
+])  # fmt: skip
 def test_hands_and_no_loads_are_seen_in_real_logs(name: str, count: int, logs: Path) -> None:
     log = reading.read(logs / "ur10e" / name, columns=UR10E)
     assert len(touched(log, "ur10e")) == count
@@ -161,18 +158,15 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("words", "reads", "models", "alignments"),
-    [
-        ("compare LOAD --reference two-cycle --free FREE --free MORE", 3, 3, 2),
-        ("compare LOAD MORE --reference two-cycle --free FREE", 3, 3, 2),
-        ("compare LOAD --reference TRUTH --free FREE", 2, 2, 1),
-        ("compare LOAD --reference two-cycle --set two-cycle.free-cycles=1", 1, 1, 0),
-        ("estimate LOAD --free FREE -o OUT", 2, 2, 1),
-        ("report LOAD --reference two-cycle --free FREE -o OUT", 2, 2, 1),
-        ("identify LOAD --method gains --free FREE -o OUT.toml", 2, 2, 1),
-    ],
-)
+@pytest.mark.parametrize(("words", "reads", "models", "alignments"), [
+    ("compare LOAD --reference two-cycle --free FREE --free MORE", 3, 3, 2),
+    ("compare LOAD MORE --reference two-cycle --free FREE", 3, 3, 2),
+    ("compare LOAD --reference TRUTH --free FREE", 2, 2, 1),
+    ("compare LOAD --reference two-cycle --set two-cycle.free-cycles=1", 1, 1, 0),
+    ("estimate LOAD --free FREE -o OUT", 2, 2, 1),
+    ("report LOAD --reference two-cycle --free FREE -o OUT", 2, 2, 1),
+    ("identify LOAD --method gains --free FREE -o OUT.toml", 2, 2, 1),
+])  # fmt: skip
 def test_every_log_is_read_modelled_and_aligned_once(
     runs: list[Path], tmp_path: Path, monkeypatch, words, reads, models, alignments
 ) -> None:

@@ -12,18 +12,16 @@ from vftcli.signals.wrench import WrenchFrame
 
 def test_the_text_holds_what_holds_and_shows_the_rest() -> None:
     """Settings come last, each group in one table."""
-    text = config_text(
-        [
-            ProposedOption("why", "sensor.delay", 0),
-            ProposedOption("why", "contacts.least", 1),
-            ProposedOption("why\nso", "robot", "ur5"),
-            ProposedOption('a \\ and a " in it', "columns", 'a"b\\c'),
-            ProposedOption("two of them", "free", ["a.csv", "b.csv"]),
-            ProposedOption("or this " * 40, "reference", "zero", holds=False),
-            ProposedOption("a remark\x07"),
-            ProposedOption("why", "sensor.cutoff", 3),
-        ]
-    )
+    text = config_text([
+        ProposedOption("why", "sensor.delay", 0),
+        ProposedOption("why", "contacts.least", 1),
+        ProposedOption("why\nso", "robot", "ur5"),
+        ProposedOption('a \\ and a " in it', "columns", 'a"b\\c'),
+        ProposedOption("two of them", "free", ["a.csv", "b.csv"]),
+        ProposedOption("or this " * 40, "reference", "zero", holds=False),
+        ProposedOption("a remark\x07"),
+        ProposedOption("why", "sensor.cutoff", 3),
+    ])  # fmt: skip
     assert tomllib.loads(text) == {
         "robot": "ur5", "columns": 'a"b\\c', "free": ["a.csv", "b.csv"],
         "sensor": {"delay": 0, "cutoff": 3}, "contacts": {"least": 1},

@@ -136,11 +136,8 @@ def test_every_entry_is_read_as_expected_or_refused_as_stated(samples, expected)
 
 def free_torque(path: Path, robot: str | Path = "ur5", until: float = 3.9, **how: Any) -> float:
     """Mean of the joints' rms by the momentum observer in free motion from .5 s on. [N·m]"""
-    choice = AnalysisChoice(
-        read=ReadChoice(**how),
-        robot=RobotChoice(name=str(robot)),
-        observers=ObserverChoice(names=("gmo",)),
-    )
+    arm, observers = RobotChoice(name=str(robot)), ObserverChoice(names=("gmo",))
+    choice = AnalysisChoice(read=ReadChoice(**how), robot=arm, observers=observers)
     analysis = analyse_log(path, choice)
     inside = (analysis.recording.t >= 0.5) & (analysis.recording.t <= until)
     tau = analysis.estimates[0].tau[inside]
@@ -148,21 +145,18 @@ def free_torque(path: Path, robot: str | Path = "ur5", until: float = 3.9, **how
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("name", "until", "how"),
-    [
-        ("ros2_ur_effort_torque", 3.9, {"effort": "auto"}),
-        ("ros2_ur_effort_torque", 3.9, {"columns": "tau+g=effort"}),
-        ("ros2_ur_effort_full_torque", 3.9, {"effort": "auto"}),
-        ("ros2_ur_effort_full_torque", 3.9, {"columns": "tau=effort"}),
-        ("bagpy_joint_states.csv", 3.19, {}),
-        ("rostopic_echo_p.csv", 3.19, {}),
-        ("ros2_topic_echo.csv", 3.19, {}),
-        ("ur5_sec_nsec.csv", 3.9, {}),
-        ("ur5_degrees_turned.csv", 3.9, {"columns": DEGREES}),
-        ("ur5_position_only.csv", 3.9, {}),
-    ],
-)
+@pytest.mark.parametrize(("name", "until", "how"), [
+    ("ros2_ur_effort_torque", 3.9, {"effort": "auto"}),
+    ("ros2_ur_effort_torque", 3.9, {"columns": "tau+g=effort"}),
+    ("ros2_ur_effort_full_torque", 3.9, {"effort": "auto"}),
+    ("ros2_ur_effort_full_torque", 3.9, {"columns": "tau=effort"}),
+    ("bagpy_joint_states.csv", 3.19, {}),
+    ("rostopic_echo_p.csv", 3.19, {}),
+    ("ros2_topic_echo.csv", 3.19, {}),
+    ("ur5_sec_nsec.csv", 3.9, {}),
+    ("ur5_degrees_turned.csv", 3.9, {"columns": DEGREES}),
+    ("ur5_position_only.csv", 3.9, {}),
+])  # fmt: skip
 def test_every_layout_gives_the_same_estimate(samples, name, until, how):
     reach = samples / "reach"
     found = free_torque(reach / name, until=until, **how)
@@ -178,15 +172,12 @@ def test_an_arm_is_laid_on_its_log_by_name(samples: Path) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("name", "columns", "words"),
-    [
-        ("ros2_ur_effort_torque", None, "torque-without-gravity.*--set log.effort=torque-with"),
-        ("ros2_ur_effort_full_torque", None, "current-as-torque.*--set log.effort=torque"),
-        ("ur5_degrees_turned.csv", DEGREES.replace("-tau", "tau"), "effort-sign.*-tau"),
-        ("ur5_degrees_turned.csv", "q[deg]=q{i},-tau=tau{i}", "velocity-unit.*deg/s"),
-    ],
-)
+@pytest.mark.parametrize(("name", "columns", "words"), [
+    ("ros2_ur_effort_torque", None, "torque-without-gravity.*--set log.effort=torque-with"),
+    ("ros2_ur_effort_full_torque", None, "current-as-torque.*--set log.effort=torque"),
+    ("ur5_degrees_turned.csv", DEGREES.replace("-tau", "tau"), "effort-sign.*-tau"),
+    ("ur5_degrees_turned.csv", "q[deg]=q{i},-tau=tau{i}", "velocity-unit.*deg/s"),
+])  # fmt: skip
 def test_what_is_not_what_it_is_called_is_refused_with_its_remedy(samples, name, columns, words):
     with pytest.raises(ExaminationError, match=words):
         free_torque(samples / "reach" / name, columns=columns)

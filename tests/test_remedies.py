@@ -200,11 +200,8 @@ def one_by_one(name: str, order: tuple[str, ...]) -> str:
 def gripping(plant: Callable[[Table], Table], kg: float, *words: str) -> Command:
     """A command on a planted log, the robot file with a gripper that is not mounted."""
     gripper = f"\n[payload.gripper]\nmass = {kg}\ncom = [0.0, 0.0, 0.05]\n"
-    return lambda folder: [
-        *of(plant, *words)(folder),
-        "--robot",
-        robot_file(folder, more=gripper),
-    ]
+    own = partial(robot_file, more=gripper)
+    return lambda folder: [*of(plant, *words)(folder), "--robot", own(folder)]
 
 
 SWAPPED = ("1", "3", "2", "4", "5", "6")

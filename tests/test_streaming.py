@@ -53,16 +53,13 @@ def check_equal(made: pl.DataFrame, whole: pl.DataFrame) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "words",
-    [
-        ("--causal",),
-        ("--causal", "--as-printed"),
-        ("--causal", "--wrench", "--observer", "kfo-zoh"),
-        ("--set", "contacts.list=no", "--observer", "gmo"),
-        ("--causal", "--interval", "2:9"),
-    ],
-)
+@pytest.mark.parametrize("words", [
+    ("--causal",),
+    ("--causal", "--as-printed"),
+    ("--causal", "--wrench", "--observer", "kfo-zoh"),
+    ("--set", "contacts.list=no", "--observer", "gmo"),
+    ("--causal", "--interval", "2:9"),
+])  # fmt: skip
 def test_numbers_and_record_of_the_whole(tmp_path: Path, request, words: tuple[str, ...]) -> None:
     whole, of_whole = estimated(tmp_path / "whole", *words, "--csv")
     request.getfixturevalue("in_blocks")
@@ -117,24 +114,21 @@ def test_wrong_robot_is_refused_before_anything_is_written(tmp_path: Path) -> No
 BASE = WrenchChoice(frame="base")
 
 
-@pytest.mark.parametrize(
-    ("asked", "log", "blocks"),
-    [
-        ({}, {}, True),
-        ({"wrench": BASE}, {}, True),
-        ({}, {"samples": 100_000}, False),  # there is memory for so many
-        ({}, {"dq": None}, False),
-        ({}, {"source": SimpleNamespace(derived=("dq",))}, False),
-        ({"contacts": True}, {}, False),
-        ({"free": FreeChoice(spans=((0.0, 1.0),))}, {}, False),
-        ({"reference": ReferenceChoice(name="zero")}, {}, False),
-        ({"observers": ObserverChoice(names=("gmo", "kfo-rts"))}, {}, False),
-        ({"wrench": replace(BASE, solver="smoother")}, {}, False),
-        ({"wrench": replace(BASE, torque_sd="own")}, {}, False),
-        ({"wrench": replace(BASE, zero=ZeroChoice(start=True))}, {}, False),
-        ({"wrench": replace(BASE, zero=ZeroChoice(spans=((0.0, 1.0),)))}, {}, False),
-    ],
-)
+@pytest.mark.parametrize(("asked", "log", "blocks"), [
+    ({}, {}, True),
+    ({"wrench": BASE}, {}, True),
+    ({}, {"samples": 100_000}, False),  # there is memory for so many
+    ({}, {"dq": None}, False),
+    ({}, {"source": SimpleNamespace(derived=("dq",))}, False),
+    ({"contacts": True}, {}, False),
+    ({"free": FreeChoice(spans=((0.0, 1.0),))}, {}, False),
+    ({"reference": ReferenceChoice(name="zero")}, {}, False),
+    ({"observers": ObserverChoice(names=("gmo", "kfo-rts"))}, {}, False),
+    ({"wrench": replace(BASE, solver="smoother")}, {}, False),
+    ({"wrench": replace(BASE, torque_sd="own")}, {}, False),
+    ({"wrench": replace(BASE, zero=ZeroChoice(start=True))}, {}, False),
+    ({"wrench": replace(BASE, zero=ZeroChoice(spans=((0.0, 1.0),)))}, {}, False),
+])  # fmt: skip
 def test_what_needs_all_of_a_log_at_once_has_it(asked, log, blocks):
     source = SimpleNamespace(derived=())
     long = SimpleNamespace(**{"samples": 100_001, "dq": True, "source": source} | log)

@@ -325,17 +325,14 @@ def test_no_log_that_is_there_makes_no_table(run, manifest: Path, tmp_path: Path
     assert [len(json.loads(out)[key]) for key in ("rows", "left_out")] == [0, 2]
 
 
-@pytest.mark.parametrize(
-    ("words", "complaint"),
-    [
-        ("field --data nodir", "--data nodir: there is no such folder"),
-        ("sim --data . --robot ur5", "benchmark sim takes no --robot, --data"),
-        ("field --set bench.rounds=1", "benchmark field takes no --set bench"),
-        ("sim --outside zz=nodir", "--outside zz=nodir: there is no folder nodir"),
-        ("speed --jobs 0 --open", "benchmark speed takes no --open, --jobs"),
-        ("speed --csv", "benchmark speed takes no --csv"),
-    ],
-)
+@pytest.mark.parametrize(("words", "complaint"), [
+    ("field --data nodir", "--data nodir: there is no such folder"),
+    ("sim --data . --robot ur5", "benchmark sim takes no --robot, --data"),
+    ("field --set bench.rounds=1", "benchmark field takes no --set bench"),
+    ("sim --outside zz=nodir", "--outside zz=nodir: there is no folder nodir"),
+    ("speed --jobs 0 --open", "benchmark speed takes no --open, --jobs"),
+    ("speed --csv", "benchmark speed takes no --csv"),
+])  # fmt: skip
 def test_a_wrong_word_is_one_error(run, words: str, complaint: str) -> None:
     code, out, err = run("benchmark", *words.split())
     assert (code, out) == (2, "")

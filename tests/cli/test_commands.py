@@ -105,14 +105,11 @@ def test_a_load_is_sought_in_all_episodes_and_too_few_poses_are_refused(refused,
     assert "the arm passes 2 different poses, and a load needs 4 at least" in error
 
 
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (("-o", EPISODES / "copy"), "one inside the other"),
-        (("-o", "c", "--add", "sd,force"), "--add force; there is wrench, sd,"),
-        (("-o", "c", "--robot", "ur5"), "Choose this log's arm with --robot"),
-    ],
-)
+@pytest.mark.parametrize(("words", "said"), [
+    (("-o", EPISODES / "copy"), "one inside the other"),
+    (("-o", "c", "--add", "sd,force"), "--add force; there is wrench, sd,"),
+    (("-o", "c", "--robot", "ur5"), "Choose this log's arm with --robot"),
+])  # fmt: skip
 def test_refusals_are_one_line(refused, here: Path, words: tuple[object, ...], said: str) -> None:
     assert said in refused("annotate", EPISODES, *words)
     assert not any(here.iterdir())
@@ -393,17 +390,14 @@ def test_a_sensor_in_the_log_says_where_it_is_touched() -> None:
         assert settled_reference(replace(log, wrench=wrench)) is None
 
 
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (("--rate", "0"), "--rate 0 is not a positive number"),
-        (("--rate", "1e6"), "at most 1800"),
-        (("--interval", "0:6"), "record at least 27 s"),
-        (("--check", "none.npy"), "none.npy"),
-        (("--check", "pushed.npy", "--reference", "nobody"), "no reference 'nobody'"),
-        (("--reference", "sensor"), "name that with --check LOG"),
-    ],
-)
+@pytest.mark.parametrize(("words", "said"), [
+    (("--rate", "0"), "--rate 0 is not a positive number"),
+    (("--rate", "1e6"), "at most 1800"),
+    (("--interval", "0:6"), "record at least 27 s"),
+    (("--check", "none.npy"), "none.npy"),
+    (("--check", "pushed.npy", "--reference", "nobody"), "no reference 'nobody'"),
+    (("--reference", "sensor"), "name that with --check LOG"),
+])  # fmt: skip
 def test_an_error_is_one_line(words: tuple[str, ...], said: str, free: Path, pushed, refused):
     given = [pushed if word == "pushed.npy" else word for word in words]
     assert said in refused("thresholds", free, *COLUMNS, *given)

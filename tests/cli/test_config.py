@@ -102,27 +102,24 @@ def test_logs_behind_two_dashes_stay_behind_them(run, here: Path) -> None:
     assert json.loads(out)["command"] == command
 
 
-@pytest.mark.parametrize(
-    ("text", "said"),
-    [
-        ('robt = "ur5"', "is no option of a command that reads a log. Did you mean robot?"),
-        ("dance = 1", "A key is an option without its dashes, as robot."),
-        ('[compare]\nrobt = "ur5"', "'robt' is no option of compare. Did you mean robot?"),
-        ("[compre]\nwrench = true", "compre.wrench is no setting here; vftcli help settings"),
-        ("force = true", "force is not kept in a file; type --force"),
-        ("robot = ", "not valid TOML"),
-        ("robot = true", "robot = True is not a text or a number"),
-        ('robot = ["ur5", "ur3"]', "is not a text or a number"),
-        ("robot = {name = 'ur5'}", "robot.name is no setting"),
-        ("[two-cycle]\nperiot = 4", "here; vftcli help settings lists all. Did you mean"),
-        ("free = [[1, 2]]", "is not a text, a number or a list of them"),
-        ('wrench = "yes"', "wrench = 'yes' is neither true nor false"),
-        ('[two-cycle]\nperiod = "long"', "two-cycle.period=long is not a number"),
-        ('[two-cycle]\nalignment = "odd"', "no alignment 'odd'"),
-        ("two-cycle = 4", "'two-cycle' is no option of a command that reads a log"),
-        ('robot = "mine.toml"', f"{Path('sub/mine.toml')}: no such robot file"),
-    ],
-)
+@pytest.mark.parametrize(("text", "said"), [
+    ('robt = "ur5"', "is no option of a command that reads a log. Did you mean robot?"),
+    ("dance = 1", "A key is an option without its dashes, as robot."),
+    ('[compare]\nrobt = "ur5"', "'robt' is no option of compare. Did you mean robot?"),
+    ("[compre]\nwrench = true", "compre.wrench is no setting here; vftcli help settings"),
+    ("force = true", "force is not kept in a file; type --force"),
+    ("robot = ", "not valid TOML"),
+    ("robot = true", "robot = True is not a text or a number"),
+    ('robot = ["ur5", "ur3"]', "is not a text or a number"),
+    ("robot = {name = 'ur5'}", "robot.name is no setting"),
+    ("[two-cycle]\nperiot = 4", "here; vftcli help settings lists all. Did you mean"),
+    ("free = [[1, 2]]", "is not a text, a number or a list of them"),
+    ('wrench = "yes"', "wrench = 'yes' is neither true nor false"),
+    ('[two-cycle]\nperiod = "long"', "two-cycle.period=long is not a number"),
+    ('[two-cycle]\nalignment = "odd"', "no alignment 'odd'"),
+    ("two-cycle = 4", "'two-cycle' is no option of a command that reads a log"),
+    ('robot = "mine.toml"', f"{Path('sub/mine.toml')}: no such robot file"),
+])  # fmt: skip
 def test_what_is_wrong_with_a_file_is_said_in_one_line(refused, here, text, said) -> None:
     (here / "sub").mkdir()
     file = keep(here / "sub", text, "kept.toml").relative_to(here)
@@ -313,19 +310,16 @@ def test_every_setting_of_a_command_is_listed_once(helped) -> None:
     assert "default yes" in text.partition("contacts.list")[2].partition("log.derive")[0]
 
 
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (("help", "colums"), "Did you mean columns?"),
-        (("help", "weather"), "there is columns, reference, gains, frames, config, robots,"),
-        (("help", "formats", "headerles"), "Did you mean headerless?"),
-        (("help", "frames", "flange"), "a name follows robots or formats only"),
-        (("reprot", "x.csv"), "No such command 'reprot'. Did you mean report?"),
-        (("dance",), "No such command 'dance'."),
-        (("report", "--freee", "x"), "No such option: --freee (Possible options: --free)"),
-        (("report", "--zzz", "x"), "No such option: --zzz"),
-    ],
-)
+@pytest.mark.parametrize(("words", "said"), [
+    (("help", "colums"), "Did you mean columns?"),
+    (("help", "weather"), "there is columns, reference, gains, frames, config, robots,"),
+    (("help", "formats", "headerles"), "Did you mean headerless?"),
+    (("help", "frames", "flange"), "a name follows robots or formats only"),
+    (("reprot", "x.csv"), "No such command 'reprot'. Did you mean report?"),
+    (("dance",), "No such command 'dance'."),
+    (("report", "--freee", "x"), "No such option: --freee (Possible options: --free)"),
+    (("report", "--zzz", "x"), "No such option: --zzz"),
+])  # fmt: skip
 def test_what_there_is_not_names_the_nearest_if_it_is_near(words, said, run):
     code, out, err = run(*words)
     assert (code, out) == (1 if words[0] == "help" else 2, "")

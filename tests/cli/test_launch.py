@@ -62,14 +62,11 @@ def test_files_are_complete_when_it_has_left(tmp_path: Path) -> None:
     assert pl.read_parquet(tmp_path / "out" / "estimates.parquet").height == 2501
 
 
-@pytest.mark.parametrize(
-    ("words", "code", "said"),
-    [
-        (("--help",), 1, "error: standard output is closed\n"),
-        (("help", "robots"), 1, "error: standard output is closed\n"),
-        (("estimate",), 2, "Missing argument"),
-    ],
-)
+@pytest.mark.parametrize(("words", "code", "said"), [
+    (("--help",), 1, "error: standard output is closed\n"),
+    (("help", "robots"), 1, "error: standard output is closed\n"),
+    (("estimate",), 2, "Missing argument"),
+])  # fmt: skip
 def test_a_closed_output_is_one_line(words: tuple[str, ...], code: int, said: str) -> None:
     shell = ["sh", "-c", 'exec "$@" >&-', "sh", sys.executable, "-c", PROGRAM, *words]
     done = subprocess.run(shell, capture_output=True, text=True, check=False)
@@ -161,17 +158,14 @@ def test_a_limit_on_memory_that_holds_no_library_is_one_line(tmp_path: Path) -> 
     assert "error: the memory limit of 0.7 GB (ulimit -v) is less than the 3" in done.stderr
 
 
-@pytest.mark.parametrize(
-    ("error", "said"),
-    [
-        (MemoryError(), "error: out of memory; use --interval to take a part of the log\n"),
-        (OSError(28, "No space left", "x.csv"), "error: No space left: x.csv\n"),
-        (OSError(5, "Input/output error"), "error: Input/output error\n"),
-        (OSError("odd"), "error: odd\n"),
-        (BrokenPipeError(32, "Broken pipe"), ""),  # nobody reads any more
-        (ParameterError("two\n  lines\x07"), "error: two lines\\x07\n"),
-    ],
-)
+@pytest.mark.parametrize(("error", "said"), [
+    (MemoryError(), "error: out of memory; use --interval to take a part of the log\n"),
+    (OSError(28, "No space left", "x.csv"), "error: No space left: x.csv\n"),
+    (OSError(5, "Input/output error"), "error: Input/output error\n"),
+    (OSError("odd"), "error: odd\n"),
+    (BrokenPipeError(32, "Broken pipe"), ""),  # nobody reads any more
+    (ParameterError("two\n  lines\x07"), "error: two lines\\x07\n"),
+])  # fmt: skip
 def test_what_goes_wrong_is_one_line(run, monkeypatch, error, said):
     def fail(**_: object) -> None:
         raise error

@@ -83,7 +83,7 @@ BAD = {
     "--zero": ("nowhere", "is neither A:B with A < B, in seconds, nor start; name a log"),
     "virtual-sensor.torque-sd": ("some", "virtual-sensor.torque-sd"),
     "log.derive": ("tau", "log.derive 'tau'"),
-    "--reference": ("magic", "no reference 'magic'"),
+    "--reference": ("magic", "no reference 'magic'; there is zero, vendor, two-cycle, sensor"),
     "--figures": ("gif", "--figures 'gif' is not pdf, svg or png"),
     "--config": ("nowhere.toml", "--config nowhere.toml: no such file"),
 }
@@ -183,14 +183,11 @@ def test_a_choice_of_nothing_typed_is_the_choice_s_default(choice: type[Choice])
     assert choice.parsed(**nothing) == choice()
 
 
-@pytest.mark.parametrize(
-    "typed",
-    [
-        {"wrench": True}, {"frame": "base"}, {"zero": ["1:2"]}, {"virtual-sensor.solver": "map"},
-        {"virtual-sensor.tool": "0,0,0.1"}, {"virtual-sensor.sensor": FIT},
-        {"virtual-sensor.torque-sd": "own"}, {},
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize("typed", [
+    {"wrench": True}, {"frame": "base"}, {"zero": ["1:2"]}, {"virtual-sensor.solver": "map"},
+    {"virtual-sensor.tool": "0,0,0.1"}, {"virtual-sensor.sensor": FIT},
+    {"virtual-sensor.torque-sd": "own"}, {},
+])  # fmt: skip
 def test_any_option_of_it_asks_for_a_wrench(typed: dict[str, Any]) -> None:
     settings = {name: text for name, text in typed.items() if "." in name}
     words = {name: word for name, word in typed.items() if "." not in name}
@@ -278,15 +275,12 @@ def test_what_a_former_command_is_now_exists(name: str, commands) -> None:
     assert {word for word in now if word.startswith("-")} <= options
 
 
-@pytest.mark.parametrize(
-    ("words", "now"),
-    [
-        ("init a.csv", "inspect -o vftcli.toml a.csv"),
-        ("init a.csv -o b.toml", "inspect a.csv -o b.toml"),
-        ("init --output=b.toml a.csv", "inspect --output=b.toml a.csv"),
-        ("tune a.csv -o b.toml", "identify --method gains a.csv -o b.toml"),
-    ],
-)
+@pytest.mark.parametrize(("words", "now"), [
+    ("init a.csv", "inspect -o vftcli.toml a.csv"),
+    ("init a.csv -o b.toml", "inspect a.csv -o b.toml"),
+    ("init --output=b.toml a.csv", "inspect --output=b.toml a.csv"),
+    ("tune a.csv -o b.toml", "identify --method gains a.csv -o b.toml"),
+])  # fmt: skip
 def test_a_former_command_is_called_with_its_words(words: str, now: str) -> None:
     assert with_command(words.split()) == now.split()
 
@@ -360,30 +354,27 @@ PROGRAM = "import sys; sys.argv[0] = 'vftcli'; from vftcli.cli import launch; la
 LOG = str(CIRCLE)
 
 
-@pytest.mark.parametrize(
-    ("words", "values"),
-    [
-        (("rep",), {"report", "reproduce"}),
-        (("report", "--fr"), {"--free", "--frame"}),
-        (("contacts", "--robot", "ur1"), {"ur10", "ur10e", "ur16e"}),
-        ((LOG, "--robot", "ur10"), {"ur10", "ur10e"}),
-        (("--robot", "ur5", LOG, "--arm", "l"), {"left"}),
-        (("report", "--observer", "kfo-"), {"kfo-auto", "kfo-fe", "kfo-rts", "kfo-zoh"}),
-        (("compare", "--reference", "ze"), {"zero"}),
-        (("report", "--gains", "p"), {"paper"}),
-        (("report", "--frame", "f"), {"flange"}),
-        (("report", "--figures", "s"), {"svg"}),
-        (("batch", "--do", "co"), {"compare", "contacts"}),
-        (("simulate", "--as", "lib"), {"libfranka"}),
-        (("report", "--set", "two-cycle.l"), {"two-cycle.low-pass="}),
-        (("report", "--set", "gmo."), {"gmo.gain="}),
-        (("admit", "--set", "rz.thr"), {"rz.threshold="}),
-        (("contacts", "--set", "bench"), set()),
-        (("help", "fr"), {"frames"}),
-        (("help", "co"), {"columns", "config", "contacts", "compare", "convert"}),
-        (("report", "--robot", "my_"), set()),  # the shell offers files
-    ],
-)
+@pytest.mark.parametrize(("words", "values"), [
+    (("rep",), {"report", "reproduce"}),
+    (("report", "--fr"), {"--free", "--frame"}),
+    (("contacts", "--robot", "ur1"), {"ur10", "ur10e", "ur16e"}),
+    ((LOG, "--robot", "ur10"), {"ur10", "ur10e"}),
+    (("--robot", "ur5", LOG, "--arm", "l"), {"left"}),
+    (("report", "--observer", "kfo-"), {"kfo-auto", "kfo-fe", "kfo-rts", "kfo-zoh"}),
+    (("compare", "--reference", "ze"), {"zero"}),
+    (("report", "--gains", "p"), {"paper"}),
+    (("report", "--frame", "f"), {"flange"}),
+    (("report", "--figures", "s"), {"svg"}),
+    (("batch", "--do", "co"), {"compare", "contacts"}),
+    (("simulate", "--as", "lib"), {"libfranka"}),
+    (("report", "--set", "two-cycle.l"), {"two-cycle.low-pass="}),
+    (("report", "--set", "gmo."), {"gmo.gain="}),
+    (("admit", "--set", "rz.thr"), {"rz.threshold="}),
+    (("contacts", "--set", "bench"), set()),
+    (("help", "fr"), {"frames"}),
+    (("help", "co"), {"columns", "config", "contacts", "compare", "convert"}),
+    (("report", "--robot", "my_"), set()),  # the shell offers files
+])  # fmt: skip
 def test_values_are_offered(words: tuple[str, ...], values: set[str]) -> None:
     asked = {
         "_VFTCLI_COMPLETE": "complete_bash",

@@ -229,18 +229,15 @@ def test_what_is_for_programs_is_printed_as_it_is() -> None:
 BRIGHT = "\x1b[32m" + "word " * 3 + "\x1b[0m"
 
 
-@pytest.mark.parametrize(
-    ("text", "width", "lines"),
-    [
-        ("ab cd", 5, ["ab cd"]),
-        ("ab cd", 4, ["ab", "  cd"]),
-        ("a bcdefg", 6, ["a", "  bcdefg"]),  # a word of the width is broken off,
-        ("a bcdefgh", 6, ["a bcdefgh"]),  # a longer one is a path to copy
-        ("  a-b c", 5, ["  a-b", "    c"]),
-        (f"{BRIGHT}\nvftcli cd ef", 15, [BRIGHT, "vftcli cd ef"]),  # colours have no width
-        ("vftcli cd ef", 6, ["vftcli cd ef"]),  # words to copy
-    ],
-)
+@pytest.mark.parametrize(("text", "width", "lines"), [
+    ("ab cd", 5, ["ab cd"]),
+    ("ab cd", 4, ["ab", "  cd"]),
+    ("a bcdefg", 6, ["a", "  bcdefg"]),  # a word of the width is broken off,
+    ("a bcdefgh", 6, ["a bcdefgh"]),  # a longer one is a path to copy
+    ("  a-b c", 5, ["  a-b", "    c"]),
+    (f"{BRIGHT}\nvftcli cd ef", 15, [BRIGHT, "vftcli cd ef"]),  # colours have no width
+    ("vftcli cd ef", 6, ["vftcli cd ef"]),  # words to copy
+])  # fmt: skip
 def test_a_line_is_broken_where_it_does_not_fit(text: str, width: int, lines: list[str]) -> None:
     assert fitted(text, width).split("\n") == lines
 

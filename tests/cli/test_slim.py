@@ -47,32 +47,26 @@ def test_a_report_holds_all_but_the_recording(folder: Path) -> None:
     assert "recording.rrd" not in there
 
 
-@pytest.mark.parametrize(
-    "words",
-    [
-        ("inspect", CIRCLE),
-        ("compare", CIRCLE, "--robot", "ur5", "--reference", "zero", "--interval", "0:4"),
-        ("identify", CIRCLE, "--robot", "ur5", "--method", "gains", "-o", "gains.toml"),
-        ("identify", CIRCLE, "--robot", "ur5", "--method", "friction", "-o", "mine.toml"),
-        ("benchmark", "speed", "--set", "bench.rounds=1", "--set", "bench.samples=1200"),
-    ],
-)
+@pytest.mark.parametrize("words", [
+    ("inspect", CIRCLE),
+    ("compare", CIRCLE, "--robot", "ur5", "--reference", "zero", "--interval", "0:4"),
+    ("identify", CIRCLE, "--robot", "ur5", "--method", "gains", "-o", "gains.toml"),
+    ("identify", CIRCLE, "--robot", "ur5", "--method", "friction", "-o", "mine.toml"),
+    ("benchmark", "speed", "--set", "bench.rounds=1", "--set", "bench.samples=1200"),
+])  # fmt: skip
 def test_what_needs_none_of_them_works(words: tuple[str, ...], folder: Path) -> None:
     done = launched(*(folder / w if "." in str(w) and "=" not in str(w) else w for w in words))
     assert done.returncode == 0, done.stderr
 
 
-@pytest.mark.parametrize(
-    ("words", "line"),
-    [
-        (("simulate", "ur5-circle", "-o", "x.csv"), "vftcli simulate needs pin"),
-        (("admit", "--release", "x=0.3", "--robot", "ur5"), "vftcli admit needs pin"),
-        (("estimate", CIRCLE, "--robot", "ur5", "--rrd", "-o", "x"),
-         "recording.rrd (--rrd, --open) needs rerun-sdk"),
-        (("compare", CIRCLE, "--robot", "ur5", "--reference", "zero", "--as-printed"),
-         "a Pinocchio model (simulation, replay, --as-printed) needs pin"),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(("words", "line"), [
+    (("simulate", "ur5-circle", "-o", "x.csv"), "vftcli simulate needs pin"),
+    (("admit", "--release", "x=0.3", "--robot", "ur5"), "vftcli admit needs pin"),
+    (("estimate", CIRCLE, "--robot", "ur5", "--rrd", "-o", "x"),
+     "recording.rrd (--rrd, --open) needs rerun-sdk"),
+    (("compare", CIRCLE, "--robot", "ur5", "--reference", "zero", "--as-printed"),
+     "a Pinocchio model (simulation, replay, --as-printed) needs pin"),
+])  # fmt: skip
 def test_the_others_say_what_is_missing(words: tuple[str, ...], line: str) -> None:
     done = launched(*words)
     package = line.rsplit(maxsplit=1)[-1]

@@ -31,14 +31,11 @@ def options(folder: Path) -> dict[str, object]:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("log", "given", "expected"),
-    [
-        ("ur5_circle.csv", ("--robot", "ur5"), {"robot": "ur5", "reference": "two-cycle"}),
-        ("ur5_sensor.parquet", (), {"robot": "ur5", "reference": "sensor"}),
-        ("panda_bag", ("--robot", "panda"), {"robot": "panda", "reference": "sensor"}),
-    ],
-)
+@pytest.mark.parametrize(("log", "given", "expected"), [
+    ("ur5_circle.csv", ("--robot", "ur5"), {"robot": "ur5", "reference": "two-cycle"}),
+    ("ur5_sensor.parquet", (), {"robot": "ur5", "reference": "sensor"}),
+    ("panda_bag", ("--robot", "panda"), {"robot": "panda", "reference": "sensor"}),
+])  # fmt: skip
 def test_what_is_written_gives_the_numbers_of_typed_options(run, here, log, given, expected):
     code, _, err = run("inspect", FIXTURES / log, *given, "-o", NAME)
     assert (code, options(here)) == (0, expected)
@@ -182,20 +179,17 @@ def test_estimates_go_into_a_folder_here_named_after_the_log(run, refused, here:
     assert (folder / "run.json").read_text() != "precious"
 
 
-@pytest.mark.parametrize(
-    ("words", "folder"),
-    [
-        (("report", "push.csv"), "push.vft"),
-        (("report", "sub/push.tar.csv.gz"), "push.tar.vft"),
-        (("report", "push.bag"), "push.vft"),
-        (("report", "run_1.5"), "run_1.5.vft"),
-        (("report", "bag.d"), "bag.d.vft"),
-        (("report", "push.h5", "--episode", "3"), "push-3.vft"),
-        (("report", "push.csv", "--episode", "2", "--arm", "left"), "push-2-left.vft"),
-        (("report", "a.csv", "b.csv"), "report.vft"),
-        (("reproduce", "huang2025"), "huang2025.vft"),
-    ],
-)
+@pytest.mark.parametrize(("words", "folder"), [
+    (("report", "push.csv"), "push.vft"),
+    (("report", "sub/push.tar.csv.gz"), "push.tar.vft"),
+    (("report", "push.bag"), "push.vft"),
+    (("report", "run_1.5"), "run_1.5.vft"),
+    (("report", "bag.d"), "bag.d.vft"),
+    (("report", "push.h5", "--episode", "3"), "push-3.vft"),
+    (("report", "push.csv", "--episode", "2", "--arm", "left"), "push-2-left.vft"),
+    (("report", "a.csv", "b.csv"), "report.vft"),
+    (("reproduce", "huang2025"), "huang2025.vft"),
+])  # fmt: skip
 def test_the_folder_s_name_and_nothing_is_read_before_it_is_refused(refused, here, words, folder):
     (here / "bag.d").mkdir()
     (here / folder).mkdir()
@@ -228,22 +222,19 @@ def there(here: Path) -> Path:
     return here
 
 
-@pytest.mark.parametrize(
-    "words",
-    [
-        "convert log.csv -o log.csv",
-        "convert log.csv -o link.csv",
-        "convert log.csv -o hard.csv",
-        "convert link.csv -o ./log.csv",
-        "estimate estimates.parquet --robot ur5 -o .",
-        "estimate log.csv --free recording.rrd --robot ur5 --rrd -o .",
-        "report log.csv --robot ur5 --reference file:estimates.parquet -o .",
-        "identify log.csv --robot arm.toml -o arm.toml",
-        "identify log.csv --method gains --robot arm.toml -o arm.toml",
-        "identify log.csv --method gains --robot ur5 --free log -o log",
-        "simulate scene.toml -o scene.toml",
-    ],
-)
+@pytest.mark.parametrize("words", [
+    "convert log.csv -o log.csv",
+    "convert log.csv -o link.csv",
+    "convert log.csv -o hard.csv",
+    "convert link.csv -o ./log.csv",
+    "estimate estimates.parquet --robot ur5 -o .",
+    "estimate log.csv --free recording.rrd --robot ur5 --rrd -o .",
+    "report log.csv --robot ur5 --reference file:estimates.parquet -o .",
+    "identify log.csv --robot arm.toml -o arm.toml",
+    "identify log.csv --method gains --robot arm.toml -o arm.toml",
+    "identify log.csv --method gains --robot ur5 --free log -o log",
+    "simulate scene.toml -o scene.toml",
+])  # fmt: skip
 def test_no_input_is_ever_overwritten(refused, there: Path, words: str) -> None:
     before = {path: path.read_bytes() for path in there.iterdir()}
     assert "what this command reads" in refused(*words.split(), "--force")

@@ -103,12 +103,9 @@ def test_an_interval_does_not_depend_on_who_else_is_asked() -> None:
 
 
 def pair(first: Array, second: Array) -> tuple[list[ExternalTorque], ExternalTorque]:
-    t = STEP * np.arange(len(first))
-    make = [
-        ExternalTorque(name=name, t=t, tau=error[:, None])
-        for name, error in (("fdo", first), ("gmo", second))
-    ]
-    return make, ExternalTorque(name="zero", t=t, tau=np.zeros((len(t), 1)))
+    t, named = STEP * np.arange(len(first)), {"fdo": first, "gmo": second, "zero": 0.0 * first}
+    *made, zero = (ExternalTorque(name=n, t=t, tau=tau[:, None]) for n, tau in named.items())
+    return made, zero
 
 
 def test_a_difference_is_sure_where_the_draws_are_paired() -> None:
@@ -164,9 +161,8 @@ def test_an_interval_is_students_of_its_blocks() -> None:
 @pytest.mark.parametrize("count", [30, 3000, 20_000])
 def test_a_correlation_time_by_blocks_is_that_of_the_whole(memory: float, count: int) -> None:
     """Of one transform of the whole series, whichever of the growing numbers of lags is enough."""
-    x = lfilter(
-        [1.0], [1.0, -memory], np.random.default_rng(8).standard_normal((count, 2)), axis=0
-    )
+    noise = np.random.default_rng(8).standard_normal((count, 2))
+    x = lfilter([1.0], [1.0, -memory], noise, axis=0)
     centred = x - x.mean(axis=0)
     spectrum = np.abs(np.fft.rfft(centred, 2 * count, axis=0)) ** 2
     product = np.fft.irfft(spectrum, axis=0)[: count // 2]
@@ -211,9 +207,8 @@ def test_a_joint_without_two_known_samples_has_no_row() -> None:
     unknown = np.full(500, np.nan)
     unknown[3] = 1.0
     two = [estimate(n, *np.ones((2, 500))) for n in ("a", "b")]
-    assert paired_significance("log", two, estimate("z", unknown, np.zeros(500)))[
-        "joint"
-    ].to_list() == [2]
+    table = paired_significance("log", two, estimate("z", unknown, np.zeros(500)))
+    assert table["joint"].to_list() == [2]
 
 
 def test_p_is_two_sided_and_draws_within_a_billionth_are_one_number() -> None:

@@ -99,16 +99,13 @@ def test_a_log_that_lacks_a_part_is_refused(tmp_path: Path, lost: str) -> None:
         opened(made_log(tmp_path, lost=lost))
 
 
-@pytest.mark.parametrize(
-    ("column", "value", "reported"),
-    [
-        # Its square is infinite.
-        ("jacobian_4_2", 1e200, "jacobian cell 31 is 1e[+]200 in sample 201"),
-        ("tau_ext_3", -1e200, "tau_ext of joint 4 is -1e[+]200 in sample 201"),
-        ("fy", float("nan"), "wrench axis 2 is nan in sample 201"),
-        ("timestamp", 1e300, "time runs backwards"),
-    ],
-)
+@pytest.mark.parametrize(("column", "value", "reported"), [
+    # Its square is infinite.
+    ("jacobian_4_2", 1e200, "jacobian cell 31 is 1e[+]200 in sample 201"),
+    ("tau_ext_3", -1e200, "tau_ext of joint 4 is -1e[+]200 in sample 201"),
+    ("fy", float("nan"), "wrench axis 2 is nan in sample 201"),
+    ("timestamp", 1e300, "time runs backwards"),
+])  # fmt: skip
 def test_a_value_that_nobody_measured_is_refused_in_one_line(
     tmp_path: Path, column: str, value: float, reported: str
 ) -> None:
@@ -127,15 +124,12 @@ def test_a_header_alone_is_refused(tmp_path: Path) -> None:
         opened(path)
 
 
-@pytest.mark.parametrize(
-    ("name", "forces"),
-    [
-        # rms and zero-mean rms as measured outside of this code with the pseudo-inverse of J;
-        # in the Jacobian's axes, so that the sensor's y stands under z.
-        ("traj_raw.csv", ((0.340, 0.294, 0.556), (0.227, 0.264, 0.370))),
-        ("press_1.csv", ((0.242, 0.196, 0.315), (0.174, 0.196, 0.228))),
-    ],
-)
+@pytest.mark.parametrize(("name", "forces"), [
+    # rms and zero-mean rms as measured outside of this code with the pseudo-inverse of J;
+    # in the Jacobian's axes, so that the sensor's y stands under z.
+    ("traj_raw.csv", ((0.340, 0.294, 0.556), (0.227, 0.264, 0.370))),
+    ("press_1.csv", ((0.242, 0.196, 0.315), (0.174, 0.196, 0.228))),
+])  # fmt: skip
 def test_a_vendor_s_wrench_beside_an_ati_sensor(
     logs: Path, name: str, forces: tuple[tuple[float, ...], tuple[float, ...]]
 ) -> None:

@@ -76,12 +76,10 @@ def test_fdo_and_gmo_are_one_filter_to_a_millionth() -> None:
 
 
 def test_floors_and_unknown_errors_stand_in_their_joints() -> None:
+    joint = pl.col("joint")
     table = errors().with_columns(
-        pl.when(pl.col("joint") == 2).then(None).otherwise(pl.col("rmse_Nm")).alias("rmse_Nm"),
-        pl.when(pl.col("joint") == 3)
-        .then(None)
-        .otherwise(0.1 * pl.col("joint"))
-        .alias("reference_floor_Nm"),
+        rmse_Nm=pl.when(joint != 2).then(pl.col("rmse_Nm")),
+        reference_floor_Nm=pl.when(joint != 3).then(0.1 * joint),
     )
     found = compare_with("table1", table, OBSERVERS, TUNINGS)
     assert np.isnan(found.ours["fdo"][1])

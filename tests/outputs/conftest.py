@@ -45,14 +45,10 @@ def recording() -> Recording:
         path=Path(HOSTILE), format="table", sha256="ab" * 32, t0=100.25, rows=600,
         remarks=(fact("sign-turned", signal="<b>one</b>"), odd),
     )  # fmt: skip
-    return Recording(
-        t=t,
-        q=q,
-        dq=0.5 * rate * np.cos(t[:, None] * rate),
-        current=held + rng.normal(0.0, 1.0, (samples, 6)),
-        tau_ext=rng.normal(0.0, 2.0, (samples, 6)),
-        source=source,
-    )
+    current = held + rng.normal(0.0, 1.0, (samples, 6))
+    tau_ext = rng.normal(0.0, 2.0, (samples, 6))
+    dq = 0.5 * rate * np.cos(t[:, None] * rate)
+    return Recording(t=t, q=q, dq=dq, current=current, tau_ext=tau_ext, source=source)
 
 
 @pytest.fixture(scope="session")

@@ -33,47 +33,29 @@ class Picture(NamedTuple):
     height: int = 0  # how much of a page is shown [px]
 
 
-EXHIBITS = (
-    (
-        (
-            "vftcli report fixtures/ur5_circle.csv --robot ur5 --reference two-cycle"
-            " --figures png -o circle",
-        ),
-        (
-            Picture("report", "circle/index.html", 1040),
-            Picture("recording", "circle/recording.rrd"),
-            *(
-                Picture(name, f"circle/figures/{name}-double.png")
-                for name in ("torque", "force", "errors", "spectra")
-            ),
-        ),
-    ),
-    (
-        ("vftcli report fixtures/ur5_circle.csv fixtures/ur5_table1.csv --robot ur5 -o logs",),
-        (Picture("index", "logs/index.html", 290),),
-    ),
-    (
-        (
-            "vftcli simulate free-excitation -o excitation.csv",
-            "vftcli identify excitation.csv --robot ur5 -o arm.toml",
-        ),
-        (Picture("identify", "arm.html", 985),),
-    ),
-    (
-        ("vftcli admit --release x=0.3 --robot ur5 --alpha 1,1.3,1.6,1.9 -o release",),
-        (Picture("admit", "release/index.html", 1062),),
-    ),
-    (
-        (
-            "vftcli identify ur10_exciting.db3 --columns tau=effort --robot ur10"
-            " --interval 0:13.7 -o my_ur10.toml",
-            "vftcli compare ur10_exciting.db3 --columns tau=effort --robot my_ur10.toml"
-            " --reference zero --interval 13.7:27.5 --figures png -o after",
-        ),
-        (Picture("story", "after/figures/errors-double.png"),),
-    ),
+DRAWN = ("torque", "force", "errors", "spectra")
+COMMANDS = (
+    "vftcli report fixtures/ur5_circle.csv --robot ur5 --reference two-cycle --figures png"
+    " -o circle",
+    "vftcli report fixtures/ur5_circle.csv fixtures/ur5_table1.csv --robot ur5 -o logs",
+    "vftcli simulate free-excitation -o excitation.csv",
+    "vftcli identify excitation.csv --robot ur5 -o arm.toml",
+    "vftcli admit --release x=0.3 --robot ur5 --alpha 1,1.3,1.6,1.9 -o release",
+    "vftcli identify ur10_exciting.db3 --columns tau=effort --robot ur10 --interval 0:13.7"
+    " -o my_ur10.toml",
+    "vftcli compare ur10_exciting.db3 --columns tau=effort --robot my_ur10.toml --reference zero"
+    " --interval 13.7:27.5 --figures png -o after",
 )
-"""Commands and their pictures, in order."""
+EXHIBITS = (
+    Picture("report", "circle/index.html", 1040),
+    Picture("recording", "circle/recording.rrd"),
+    *(Picture(name, f"circle/figures/{name}-double.png") for name in DRAWN),
+    Picture("index", "logs/index.html", 290),
+    Picture("identify", "arm.html", 985),
+    Picture("admit", "release/index.html", 1062),
+    Picture("story", "after/figures/errors-double.png"),
+)
+"""Pictures of what the commands make, one after the other."""
 EXAMPLE = (
     "vftcli report fixtures/ur5_circle.csv --robot ur5 --free 3:4 --interval 3:6.6"
     " --observer best --force -o docs/example"
@@ -92,12 +74,8 @@ def launch_touched() -> None:
     from vftcli.cli import launch
 
     span = rrb.components.AbsoluteTimeRange(*(round(1e9 * t) for t in TOUCHED))
-    playing = {
-        "play_state": "playing",
-        "playback_speed": 100.0,
-        "loop_mode": "selection",
-        "time_selection": span,
-    }
+    playing = {"play_state": "playing", "playback_speed": 100.0}
+    playing |= {"loop_mode": "selection", "time_selection": span}
     resting = rrb.TimePanel
     rrb.TimePanel = lambda **words: resting(**words | playing)
     launch()
@@ -174,11 +152,10 @@ def main() -> None:
         (folder / "fixtures").symlink_to(ROOT / "fixtures")
         for log, place in OF_STORY.items():
             (folder / log).symlink_to(Path(os.environ["VFT_LOGS"]) / place)
-        for commands, pictures in EXHIBITS:
-            for command in commands:
-                run(command, folder)
-            for picture in pictures:
-                take(picture, folder)
+        for command in COMMANDS:
+            run(command, folder)
+        for picture in EXHIBITS:
+            take(picture, folder)
 
 
 if __name__ == "__main__":

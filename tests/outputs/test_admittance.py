@@ -21,7 +21,6 @@ from vftcli.outputs.charts import GREY
 from vftcli.outputs.paper import WIDTHS
 from vftcli.outputs.run_record import to_json
 from vftcli.robots import load_robot
-from vftcli.signals.errors import OutputError
 from vftcli.signals.remarks import fact, sentence, warning
 from vftcli.signals.wrench import Wrench
 
@@ -59,8 +58,6 @@ def test_a_replay_becomes_a_folder_of_unrounded_rows(release: Replay, tmp_path: 
     assert record["command"] == "vftcli admit"
     assert record["input"] is None
     assert len(record["controllers"]) == len(release.controllers)
-    with pytest.raises(OutputError, match="--force"):
-        admittance.write_admittance(tmp_path / "out", Replayed(release))
     assert json.loads(to_json(release.rows)) == json.loads(json.dumps(list(release.rows)))
     with (tmp_path / "out/comparison.csv").open(encoding="utf-8") as file:
         read = list(csv.DictReader(file))

@@ -50,15 +50,12 @@ def examined(analysis: Analysis, *findings: Remark, misfit: float = 0.001) -> An
     return replace(analysis, examinations=(replace(own, findings=findings, robots=(match,)),))
 
 
-@pytest.mark.parametrize(
-    ("misfit", "standing", "sentence", "shown"),
-    [
-        (0.001, "good", "the controller's own model agrees to 0.1 %", "(model error 0.1 %)"),
-        (0.5, "caution", "50.0 %", "(does not fit: model error 50.0 %)"),
-        # As a turned sign of the current does, which leaves twice of what gravity needs.
-        (1.66, "bad", "166.0 %", "(does not fit: model error 166.0 %)"),
-    ],
-)
+@pytest.mark.parametrize(("misfit", "standing", "sentence", "shown"), [
+    (0.001, "good", "the controller's own model agrees to 0.1 %", "(model error 0.1 %)"),
+    (0.5, "caution", "50.0 %", "(does not fit: model error 50.0 %)"),
+    # As a turned sign of the current does, which leaves twice of what gravity needs.
+    (1.66, "bad", "166.0 %", "(does not fit: model error 166.0 %)"),
+])  # fmt: skip
 def test_an_arm_is_believed_by_its_misfit(without_reference, misfit, standing, sentence, shown):
     made = examined(without_reference, misfit=misfit)
     (ground,) = of(made, "robot, gravity")
@@ -102,25 +99,22 @@ UNTOLD = {"contacts": None, "remarks": (caution("contacts-not-listed", reason="n
 OF_VENDOR = listed(contact(vendor_force=61.2), contact(vendor_force=None))
 
 
-@pytest.mark.parametrize(
-    ("changed", "subject", "standing", "words", "remedy"),
-    [
-        ({"finding": OTHER}, "robot", "bad", "", "--robot ur5e"),
-        ({"finding": COLD}, "temperature", "caution", "", ""),
-        (listed(contact()), "free motion", "good", "0 contacts listed in its 4 s", ""),
-        (listed(false_on_free=1), "free motion", "caution", "1 contact listed in its 4 s", ""),
-        (listed(basis="friction", free=()), "free motion", "caution", "none is given: sizes",
-         "--free free.csv"),
-        (listed(basis="none", free=()), "free motion", "unknown", "no contact is listed",
-         "--free free.csv"),
-        ({"reference": ZERO}, "reference", "caution", "looks touched", ""),
-        ({}, "friction", "caution", "", "vftcli identify free.csv --robot ur5 -o my_ur5.toml"),
-        ({"contacts": contact_list(contact())}, "stop", "caution", "", ""),
-        (UNTOLD, "contacts", "unknown", "", ""),
-        (listed(contact()), "no reference", "unknown", "", ""),
-        (OF_VENDOR, "vendor", "unknown", "61, – N at the peaks", "--reference vendor --robot ur5"),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(("changed", "subject", "standing", "words", "remedy"), [
+    ({"finding": OTHER}, "robot", "bad", "", "--robot ur5e"),
+    ({"finding": COLD}, "temperature", "caution", "", ""),
+    (listed(contact()), "free motion", "good", "0 contacts listed in its 4 s", ""),
+    (listed(false_on_free=1), "free motion", "caution", "1 contact listed in its 4 s", ""),
+    (listed(basis="friction", free=()), "free motion", "caution", "none is given: sizes",
+     "--free free.csv"),
+    (listed(basis="none", free=()), "free motion", "unknown", "no contact is listed",
+     "--free free.csv"),
+    ({"reference": ZERO}, "reference", "caution", "looks touched", ""),
+    ({}, "friction", "caution", "", "vftcli identify free.csv --robot ur5 -o my_ur5.toml"),
+    ({"contacts": contact_list(contact())}, "stop", "caution", "", ""),
+    (UNTOLD, "contacts", "unknown", "", ""),
+    (listed(contact()), "no reference", "unknown", "", ""),
+    (OF_VENDOR, "vendor", "unknown", "61, – N at the peaks", "--reference vendor --robot ur5"),
+])  # fmt: skip
 def test_a_ground_has_its_subject_its_words_and_its_remedy(
     without_reference: Analysis, changed: dict[str, Any], subject: str, standing: str, words: str,
     remedy: str,
@@ -185,18 +179,15 @@ def test_friction_is_measured_from_the_free_log_as_read(without_reference: Analy
     assert ground.remedy == typed
 
 
-@pytest.mark.parametrize(
-    ("row", "standing"),
-    [
-        ({"sensor_force": 58.0}, "good"),  # 64.8 ± 7.1 N
-        ({"sensor_force": 57.6}, "caution"),
-        ({"sensor_force": 72.0}, "caution"),
-        # The sensor does not feel what touches a link before it, and an unknown size has no band.
-        ({"sensor_force": 3.0, "places": (2, 3)}, "good"),
-        ({"sensor_force": 3.0, "is_load": True}, "good"),
-        ({"sensor_force": 3.0, "peak_band": 65.0}, "good"),
-    ],
-)
+@pytest.mark.parametrize(("row", "standing"), [
+    ({"sensor_force": 58.0}, "good"),  # 64.8 ± 7.1 N
+    ({"sensor_force": 57.6}, "caution"),
+    ({"sensor_force": 72.0}, "caution"),
+    # The sensor does not feel what touches a link before it, and an unknown size has no band.
+    ({"sensor_force": 3.0, "places": (2, 3)}, "good"),
+    ({"sensor_force": 3.0, "is_load": True}, "good"),
+    ({"sensor_force": 3.0, "peak_band": 65.0}, "good"),
+])  # fmt: skip
 def test_a_row_that_misses_the_sensor_by_its_band_is_a_caution(without_reference, row, standing):
     listed = contact_list(contact(sensor_force=64.0), contact(number=2, **row), remarks=())
     made = replace(without_reference, contacts=listed)
@@ -261,15 +252,12 @@ def test_every_subject_stands_for_remarks_that_exist_once() -> None:
     assert subject_of("saturation") == "effort"
 
 
-@pytest.mark.parametrize(
-    ("code", "ending"),
-    [
-        ("light-load", "--method payload --robot ur5 -o loaded.toml"),
-        ("payload-not-mounted", "--robot ur5 --payload log"),
-        ("no-robot-fits", "--robot ur5 --method base -o my_robot.toml"),
-        ("saturation", "--robot ur5"),
-    ],
-)
+@pytest.mark.parametrize(("code", "ending"), [
+    ("light-load", "--method payload --robot ur5 -o loaded.toml"),
+    ("payload-not-mounted", "--robot ur5 --payload log"),
+    ("no-robot-fits", "--robot ur5 --method base -o my_robot.toml"),
+    ("saturation", "--robot ur5"),
+])  # fmt: skip
 def test_a_finding_has_its_command(without_reference: Analysis, code: str, ending: str) -> None:
     made = without_reference
     assert remedy_of(warning(code), made.recording, made).endswith(ending)

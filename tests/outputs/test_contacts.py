@@ -89,46 +89,43 @@ UNSURE = contact(peak_force=21.0, place_band=None, peak=3.04)
 NO_SIZE = contact(peak_force=None)
 
 
-@pytest.mark.parametrize(
-    ("found", "words"),
-    [
-        (contact_list(contact()), "1 contact. The hardest, at 4.7 s: 65 ± 7 N on the wrist."),
-        (contact_list(), "Nothing touched the arm, as far as this log shows."),
-        (contact_list(contact(is_load=True, mean_force=np.array([0, 0, -27.0]), peak_force=27.0)),
-         "or a wrong model: 27 ± 7 N on average, down."),
-        (contact_list(contact(peak_force=3.0, peak_band=5.0, is_load=True)),
-         "or a wrong model: below 8 N on average."),
-        (contact_list(replace(BARE, is_load=False), smallest_force=None), "1 contact."),
-        (contact_list(BY_PLACE), "depends on where it touched, unknown: 20–248 N."),
-        (contact_list(BY_PLACE, contact(number=2)),
-         "The hardest of known size, at 4.7 s: 65 ± 7 N on the wrist."),
-        (contact_list(contact(), WIDE),
-         "2 contacts. The hardest of known size, at 4.7 s: 65 ± 7 N on the wrist."),
-        (contact_list(WIDE), "1 contact. How hard is unknown: below 258 N."),
-        (contact_list(contact(peak_band=30.0, where="cannot tell")), "s: 65 ± 30 N (weak)."),
-        # What may have been touched is never called untouched.
-        (contact_list(basis="whole log"), "No contact stands out."),
-        (contact_list(basis="whole log", candidates=(FELT,)),
-         "cannot explain: name free motion (--free) or measure your friction (vftcli identify)."),
-        # A press of 3 N on an arm that the model misses by 5 N·m: one candidate of any size.
-        (contact_list(candidates=(FELT,)),
-         "Up to 40 N near 12.9 s this model cannot explain: measure your friction (vftcli "
-         "identify)."),
-        (contact_list(candidates=(NO_SIZE,)), "No contact stands out."),
-        (contact_list(candidates=(NO_SIZE, UNSURE, contact(peak_force=5.0))),
-         "Up to 21 N near 3.0 s this model cannot explain: measure your friction (vftcli "
-         "identify)."),
-        (contact_list(false_on_free=2), "the free part, which itself shows 2: was nobody there?"),
-        (contact_list(basis="none", unexplained=Unexplained(22.1, 4, 3.2)),
-         "22 N·m on J4 at 3.2 s: a contact or a model error. To list contacts name free motion "
-         "(--free) or give a robot with friction (vftcli identify)."),
-        # ± is a band of 95 %.
-        (contact_list(basis="whole log", load=LOAD),
-         "carries 2.88 ± 0.18 kg that ur10e does not know of (4.7–50.5 s). No contact stands out."),
-        (contact_list(basis="whole log", load=LOAD._replace(payload="franka_hand")),
-         "50.5 s): franka_hand? Add --payload franka_hand. No contact stands out."),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(("found", "words"), [
+    (contact_list(contact()), "1 contact. The hardest, at 4.7 s: 65 ± 7 N on the wrist."),
+    (contact_list(), "Nothing touched the arm, as far as this log shows."),
+    (contact_list(contact(is_load=True, mean_force=np.array([0, 0, -27.0]), peak_force=27.0)),
+     "or a wrong model: 27 ± 7 N on average, down."),
+    (contact_list(contact(peak_force=3.0, peak_band=5.0, is_load=True)),
+     "or a wrong model: below 8 N on average."),
+    (contact_list(replace(BARE, is_load=False), smallest_force=None), "1 contact."),
+    (contact_list(BY_PLACE), "depends on where it touched, unknown: 20–248 N."),
+    (contact_list(BY_PLACE, contact(number=2)),
+     "The hardest of known size, at 4.7 s: 65 ± 7 N on the wrist."),
+    (contact_list(contact(), WIDE),
+     "2 contacts. The hardest of known size, at 4.7 s: 65 ± 7 N on the wrist."),
+    (contact_list(WIDE), "1 contact. How hard is unknown: below 258 N."),
+    (contact_list(contact(peak_band=30.0, where="cannot tell")), "s: 65 ± 30 N (weak)."),
+    # What may have been touched is never called untouched.
+    (contact_list(basis="whole log"), "No contact stands out."),
+    (contact_list(basis="whole log", candidates=(FELT,)),
+     "cannot explain: name free motion (--free) or measure your friction (vftcli identify)."),
+    # A press of 3 N on an arm that the model misses by 5 N·m: one candidate of any size.
+    (contact_list(candidates=(FELT,)),
+     "Up to 40 N near 12.9 s this model cannot explain: measure your friction (vftcli "
+     "identify)."),
+    (contact_list(candidates=(NO_SIZE,)), "No contact stands out."),
+    (contact_list(candidates=(NO_SIZE, UNSURE, contact(peak_force=5.0))),
+     "Up to 21 N near 3.0 s this model cannot explain: measure your friction (vftcli "
+     "identify)."),
+    (contact_list(false_on_free=2), "the free part, which itself shows 2: was nobody there?"),
+    (contact_list(basis="none", unexplained=Unexplained(22.1, 4, 3.2)),
+     "22 N·m on J4 at 3.2 s: a contact or a model error. To list contacts name free motion "
+     "(--free) or give a robot with friction (vftcli identify)."),
+    # ± is a band of 95 %.
+    (contact_list(basis="whole log", load=LOAD),
+     "carries 2.88 ± 0.18 kg that ur10e does not know of (4.7–50.5 s). No contact stands out."),
+    (contact_list(basis="whole log", load=LOAD._replace(payload="franka_hand")),
+     "50.5 s): franka_hand? Add --payload franka_hand. No contact stands out."),
+])  # fmt: skip
 def test_the_answer_is_a_sentence(found: ContactList, words: str) -> None:
     assert contacts.answer(found).endswith(words)
 
@@ -157,52 +154,39 @@ def test_a_direction_names_its_large_axes() -> None:
     assert {force: contacts.direction(np.array(force)) for force in named} == named
 
 
-@pytest.mark.parametrize(
-    ("changed", "words"),
-    [
-        ({}, "the band is 10% of the force"),
-        (
-            {"anywhere": (20.0, 90.0)},
-            "the band is 10% of the force; the size depends on the place",
-        ),
-        ({"evidence": SURE_NATS}, "the band is 10% of the force"),
-        ({"evidence": SURE_NATS - 0.1}, "little evidence: friction explains nearly as much"),
-        (
-            {"remarks": (caution("arm-stopped-abruptly", at_s=3.0),)},
-            "the arm stopped abruptly at 3.00 s; what follows is not counted as contact",
-        ),
-        ({"peak_force": None}, "too few joints to know the force"),
-        ({"peak_band": None}, "too few joints to know the force"),
-        ({"is_load": True}, "lasts for most of the log"),
-    ],
-)
+@pytest.mark.parametrize(("changed", "words"), [
+    ({}, "the band is 10% of the force"),
+    ({"anywhere": (20.0, 90.0)}, "the band is 10% of the force; the size depends on the place"),
+    ({"evidence": SURE_NATS}, "the band is 10% of the force"),
+    ({"evidence": SURE_NATS - 0.1}, "little evidence: friction explains nearly as much"),
+    ({"remarks": (caution("arm-stopped-abruptly", at_s=3.0),)},
+     "the arm stopped abruptly at 3.00 s; what follows is not counted as contact"),
+    ({"peak_force": None}, "too few joints to know the force"),
+    ({"peak_band": None}, "too few joints to know the force"),
+    ({"is_load": True}, "lasts for most of the log"),
+])  # fmt: skip
 def test_trust_says_why(changed, words):
     sure = {"evidence": 400.0, "anywhere": (45.0, 60.0), "peak_force": 50.0, "peak_band": 5.0}
     assert contacts.reason(contact(**({"remarks": ()} | sure | changed))) == words
 
 
-@pytest.mark.parametrize(
-    ("changed", "words"),
-    [
-        ({}, "Nothing above 6 N at the flange. Weaker pushes may not show."),
-        ({"contacts": (contact(),)},
-         "Nothing else above 6 N at the flange. Weaker pushes may not show."),
-        ({"contacts": (contact(peak_force=6.0),)},
-         "Nothing else above 6 N at the flange (less at good poses)."),
-        ({"contacts": (contact(is_load=True),)}, ""),
-        ({"smallest_force": None}, ""),
-        ({"smallest_force": np.inf},
-         "A push along one axis may go unseen: the pose hardly shows it."),
-        ({"basis": "whole log", "contacts": (contact(),)},
-         "Flange pushes below 6 N, or through half of the log, may not show."),
-        ({"candidates": (contact(),)},
-         "Flange pushes below 6 N may not show. 1 candidate: contacts --all."),
-        ({"candidates": (contact(), contact(number=2)), "basis": "friction"},
-         "Flange pushes below 6 N, or through half of the log, may not show. 2 candidates: "
-         "contacts --all."),
-        ({"smallest_force": 3473.0},
-         "A push along one axis may go unseen: the pose hardly shows it."),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(("changed", "words"), [
+    ({}, "Nothing above 6 N at the flange. Weaker pushes may not show."),
+    ({"contacts": (contact(),)},
+     "Nothing else above 6 N at the flange. Weaker pushes may not show."),
+    ({"contacts": (contact(peak_force=6.0),)},
+     "Nothing else above 6 N at the flange (less at good poses)."),
+    ({"contacts": (contact(is_load=True),)}, ""),
+    ({"smallest_force": None}, ""),
+    ({"smallest_force": np.inf}, "A push along one axis may go unseen: the pose hardly shows it."),
+    ({"basis": "whole log", "contacts": (contact(),)},
+     "Flange pushes below 6 N, or through half of the log, may not show."),
+    ({"candidates": (contact(),)},
+     "Flange pushes below 6 N may not show. 1 candidate: contacts --all."),
+    ({"candidates": (contact(), contact(number=2)), "basis": "friction"},
+     "Flange pushes below 6 N, or through half of the log, may not show. 2 candidates: "
+     "contacts --all."),
+    ({"smallest_force": 3473.0}, "A push along one axis may go unseen: the pose hardly shows it."),
+])  # fmt: skip
 def test_what_can_be_said_of_the_rest(changed: dict[str, object], words: str) -> None:
     assert contacts.otherwise(contact_list(**changed)) == words

@@ -70,17 +70,10 @@ def test_what_is_converted_is_read_by_rosbags(tmp_path: Path) -> None:
         np.testing.assert_array_equal(values, getattr(recording, signal))
 
 
-def test_what_exists_is_kept_and_unknown_endings_are_refused(tmp_path: Path) -> None:
-    path = tmp_path / "x.csv"
-    path.write_text("mine")
-    with pytest.raises(OutputError, match="--force"):
-        convert(full(), path)
-    assert path.read_text() == "mine"
-    convert(full(), path, force=True)
-    assert path.read_text().startswith("t,t_src_ns,q/1")
+def test_unknown_endings_are_refused(tmp_path: Path) -> None:
     with pytest.raises(OutputError, match=r"\.parquet, \.mcap, \.csv"):
         convert(full(), tmp_path / "x.xlsx")
-    assert sorted(p.name for p in tmp_path.iterdir()) == ["x.csv"]
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_columns_say_what_they_hold(tmp_path: Path) -> None:

@@ -1,6 +1,3 @@
-import csv
-import io
-import json
 from collections.abc import Callable
 
 import numpy as np
@@ -77,27 +74,18 @@ def test_at_the_floor_is_within_a_fifth_of_it_also_of_one_joint() -> None:
     (block,) = error_tables.blocks(errors_of())
     assert block.at_floor.tolist() == [[True, False], [True, False]]
     assert block.title == "run.csv against two-cycle, 100 to 103 samples"
-    grid = error_tables.rmse_grid(block)
-    assert grid.rows[0][1].mark == "*"
-    assert (grid.rows[-1][0], grid.summaries) == ("floor", 1)
     none = {"reference_floor_Nm": None}
     (block,) = error_tables.blocks(errors_of(none, {}, none))
     assert block.has_floor
     assert np.isnan(block.floor[0])
-    without = errors_of(*[none] * 4)
-    assert not error_tables.blocks(without)[0].has_floor
-    assert error_tables.rmse_grid(error_tables.blocks(without)[0]).summaries == 0
-    assert "floor" not in tables.to_terminal(without)
+    assert "floor" not in tables.to_terminal(errors_of(*[none] * 4))
 
 
-@pytest.mark.parametrize(
-    ("values", "texts"),
-    [
-        ((0.5, 12.34, 0.0604, 0.946, 1.0), ["0.50–12", "60", "95 %", "best"]),
-        ((None, 1.0, 0.0, 1.0, 0.0312), ["–", "0", "100 %", "0.031"]),
-        ((0.5, None, None, None, None), ["–"] * 4),
-    ],
-)
+@pytest.mark.parametrize(("values", "texts"), [
+    ((0.5, 12.34, 0.0604, 0.946, 1.0), ["0.50–12", "60", "95 %", "best"]),
+    ((None, 1.0, 0.0, 1.0, 0.0312), ["–", "0", "100 %", "0.031"]),
+    ((0.5, None, None, None, None), ["–"] * 4),
+])  # fmt: skip
 def test_details_as_text(values: tuple[float | None, ...], texts: list[str]) -> None:
     keys = ("rmse_low_Nm", "rmse_high_Nm", "lag_s", "coverage_95", "p_vs_best")
     assert list(error_tables.details(dict(zip(keys, values, strict=True)))) == texts
@@ -165,22 +153,11 @@ def test_what_is_for_details_can_be_left_out(errors: pl.DataFrame) -> None:
     assert "no errors to show" in tables.to_terminal(pl.DataFrame(schema=SCHEMA))
 
 
-def test_json_and_csv_read_back(errors: pl.DataFrame) -> None:
-    rows = json.loads(tables.FORMS["json"](errors.with_columns(bias_Nm=float("nan"))))
-    assert [r["rmse_Nm"] for r in rows] == [0.55, 12.346, 2.0, None]
-    assert {r["bias_Nm"] for r in rows} == {None}
-    assert set(rows[0]) >= {"recording", "observer", "joint", "reference", "reference_floor_Nm"}
-    rows = list(csv.DictReader(io.StringIO(tables.FORMS["csv"](errors))))
-    assert [r["rmse_Nm"] for r in rows] == ["0.55", "12.346", "2.0", ""]
-
-
 def test_latex(errors: pl.DataFrame) -> None:
     assert "| fdo | **0.550** | **12.3** | 6.45 |" in tables.to_markdown(errors)
-    text = tables.to_latex(errors.with_columns(observer=pl.col("observer") + "_%&"))
+    text = tables.to_latex(errors)
     assert r"\caption{a\_b.csv against two-cycle, 100 samples, RMSE in N\,m}" in text
-    assert r"\begin{tabular}{lrrr}" in text
-    assert r"fdo\_\%\& & \textbf{0.550}\rlap{$^{*}$} & \textbf{12.3}\phantom{0} & 6.45" in text
-    assert text.index(r"\toprule") < text.index(r"\midrule") < text.index(r"\bottomrule")
+    assert r"fdo & \textbf{0.550}\rlap{$^{*}$} & \textbf{12.3}\phantom{0} & 6.45" in text
     assert r"floor & 0.500 & 1.00 & 0.750 \\" in text
     assert text.index("floor: the reference") < text.index(r"\end{table}")
 

@@ -51,13 +51,10 @@ def test_csv_has_the_same_columns(analysis: Analysis, tmp_path: Path) -> None:
     np.testing.assert_allclose(table["q/2"], analysis.recording.q[:, 1], atol=1e-9)
 
 
-@pytest.mark.parametrize(
-    ("extra", "name", "begins"),
-    [
-        ("mcap", "estimates.mcap", b"\x89MCAP0\r\n"),
-        pytest.param("rrd", "recording.rrd", b"RRF2", marks=pytest.mark.slow),
-    ],
-)
+@pytest.mark.parametrize(("extra", "name", "begins"), [
+    ("mcap", "estimates.mcap", b"\x89MCAP0\r\n"),
+    pytest.param("rrd", "recording.rrd", b"RRF2", marks=pytest.mark.slow),
+])  # fmt: skip
 def test_an_extra_is_one_more_file_of_its_format(analysis, tmp_path, extra, name, begins):
     write_estimate_folder(tmp_path, analysis, "", OutputChoice(extras=(extra,)))
     assert {path.name for path in tmp_path.iterdir()} == {"estimates.parquet", "run.json", name}

@@ -30,20 +30,12 @@ HOSTILE = '<b>&_%|*$#"\\{a}'
 @pytest.fixture
 def grid() -> Grid:
     """Two observers, two joints and a floor; the first number is at the floor and the best."""
+    best = GridCell("0.550", best=True, mark="*", html="0.550<i>!</i>")
     return Grid(
-        title="a_b.csv",
-        quantity="RMSE",
-        unit="N·m",
+        title="a_b.csv", quantity="RMSE", unit="N·m", summaries=1, marked=True, swatches=True,
         given=(Column("observer", words=True), *joint_columns(2)),
-        rows=(
-            ("fdo", GridCell("0.550", best=True, mark="*", html="0.550<i>!</i>"), 12.346),
-            (HOSTILE, 2.0, float("nan")),
-            ("floor", 0.5, None),
-        ),
-        summaries=1,
-        marked=True,
-        swatches=True,
-    )
+        rows=(("fdo", best, 12.346), (HOSTILE, 2.0, float("nan")), ("floor", 0.5, None)),
+    )  # fmt: skip
 
 
 def test_the_terminal_keeps_digits_below_digits(grid: Grid) -> None:
@@ -61,11 +53,8 @@ def test_the_terminal_keeps_digits_below_digits(grid: Grid) -> None:
 def test_markdown_and_latex_escape_every_text_and_bold_the_best(grid: Grid) -> None:
     lines = markdown(grid).splitlines()
     assert lines[0] == r"**a\_b.csv, RMSE in N·m**"
-    assert lines[2:5] == [
-        "| observer | J1 | J2 |",
-        "| --- | ---: | ---: |",
-        "| fdo | **0.550** | 12.3 |",
-    ]
+    heads = ["| observer | J1 | J2 |", "| --- | ---: | ---: |"]
+    assert lines[2:5] == [*heads, "| fdo | **0.550** | 12.3 |"]
     assert r"\<b\>&\_%\|\*$#" in lines[5]
     text = latex(grid)
     assert r"\caption{a\_b.csv, RMSE in N\,m}" in text

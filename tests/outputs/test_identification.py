@@ -73,8 +73,6 @@ def test_all_files_are_written_and_it_loads(found: Any, log: Recording, tmp_path
     assert record["processing"]["cutoff_hz"] == 8.0
     assert "never" in record["processing"]["differentiation"]
     assert record["inputs"][0]["sha256"] == "0" * 64
-    with pytest.raises(OutputError, match="--force"):
-        write_identification(path, found, [examine(log)], "", force=False)
     with pytest.raises(OutputError, match=r"ends in \.toml"):
         write_identification(tmp_path / "other", found, [examine(log)], "", force=False)
     assert sorted(p.name for p in tmp_path.iterdir()) == names

@@ -7,12 +7,12 @@ import polars as pl
 import pytest
 
 from vftcli.analysis import Analysis
-from vftcli.outputs import FULL, LEVELS, NONE, OutputChoice, report
+from vftcli.outputs import NONE, OutputChoice
 from vftcli.outputs.contacts import contacts_latex
 from vftcli.outputs.estimates import ERROR_TABLES, FILES, SUMMARY_FILES
 from vftcli.outputs.files import digests
 from vftcli.outputs.report import write_report
-from vftcli.signals.errors import OutputError, ParameterError
+from vftcli.signals.errors import OutputError
 
 
 def test_a_report_holds_its_files(analysis: Analysis, tmp_path: Path) -> None:
@@ -86,16 +86,6 @@ def test_several_logs_get_folders(analysis: Analysis, as_if: Callable, tmp_path:
     assert (tmp_path / "out/errors.md").read_text(encoding="utf-8").count("run.csv against") == 2
 
 
-def test_a_failing_writer_leaves_nothing(analysis, tmp_path, monkeypatch):
-    def fail(_path: Path, _analysis: Analysis) -> None:
-        raise OutputError("no")
-
-    monkeypatch.setattr(report, "write_estimates", fail)
-    with pytest.raises(OutputError, match="no"):
-        write_report(tmp_path / "out", [analysis], command="")
-    assert list(tmp_path.iterdir()) == []
-
-
 def test_a_report_replaces_another_by_force(without_reference: Analysis, tmp_path: Path) -> None:
     first = replace(without_reference, contacts=None)
     write_report(tmp_path, [without_reference], command="")
@@ -109,14 +99,3 @@ def test_a_report_replaces_another_by_force(without_reference: Analysis, tmp_pat
     gone = {"recording.rrd", "contacts.json", "contacts.csv"}
     assert {p.name for p in tmp_path.iterdir()} == found - gone
     assert json.loads((tmp_path / "run.json").read_text())["command"] == "second"
-
-
-def test_words_of_what_is_written_are_taken_or_refused() -> None:
-    assert OutputChoice.parsed() == OutputChoice(extras=(), detail=LEVELS)
-    assert OutputChoice(extras=("rrd",), detail=FULL).detail == FULL
-    assert OutputChoice.parsed(settings={"recording.detail": NONE}).detail == NONE
-    words = r"recording\.detail=much is none of full, levels and none"
-    with pytest.raises(ParameterError, match=words):
-        OutputChoice.parsed(settings={"recording.detail": "much"})
-    with pytest.raises(ParameterError, match="writes no recording"):
-        OutputChoice(extras=("rrd",), detail=NONE)

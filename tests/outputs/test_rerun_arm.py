@@ -116,17 +116,14 @@ def test_meshes_are_the_arm_where_all_of_a_link_are_found(tmp_path: Path, path: 
     assert rows_of(path, "/robot/link_5/mesh_0", "Asset3D:albedo_factor") == [own]
 
 
-@pytest.mark.parametrize(
-    ("head", "unit"),
-    [
-        ('<unit name="mm" meter="0.001"/><up_axis>Y_UP</up_axis>', 0.001),
-        ("<unit meter = '0.0254' name='inch'></unit><up_axis> X_UP</up_axis>", 0.0254),
-        ("<up_axis>Z_UP</up_axis>", 1.0),
-        ('<unit meter="x"/>', 1.0),
-        ('<unit meter="nan"/>', 1.0),
-        ('<unit meter="0"/>', 1.0),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(("head", "unit"), [
+    ('<unit name="mm" meter="0.001"/><up_axis>Y_UP</up_axis>', 0.001),
+    ("<unit meter = '0.0254' name='inch'></unit><up_axis> X_UP</up_axis>", 0.0254),
+    ("<up_axis>Z_UP</up_axis>", 1.0),
+    ('<unit meter="x"/>', 1.0),
+    ('<unit meter="nan"/>', 1.0),
+    ('<unit meter="0"/>', 1.0),
+])  # fmt: skip
 def test_a_dae_is_in_metres_with_z_up(head: str, unit: float) -> None:
     """As ROS has it: RViz leaves a file's up axis out and takes its unit."""
     found, metres = collada(f"<asset>{head}</asset><p>Y_UP</p>".encode())

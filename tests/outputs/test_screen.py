@@ -236,13 +236,8 @@ def test_a_list_is_rows_and_a_word_on_more() -> None:
     found, canvas = contact_list(*rows, candidates=(weak,)), Canvas(width=72)
     more = "  the 2 hardest of 3; --details shows all"
     assert list_lines(found, 2, canvas) == [HEADS, *EACH[1:], more, *END]
-    weaker = [
-        "",
-        "  Candidates, with too little evidence or force to be listed:",
-        HEADS,
-        ROW.format(4),
-    ]
-    assert list_lines(found, None, canvas) == [HEADS, *EACH, *weaker, *END]
+    weaker = ["", "  Candidates, with too little evidence or force to be listed:", HEADS]
+    assert list_lines(found, None, canvas) == [HEADS, *EACH, *weaker, ROW.format(4), *END]
 
 
 T = np.linspace(2.0, 20.0, 1801)

@@ -32,13 +32,10 @@ def made(joints: int = 7, *, own: bool = True, axes: int = 6) -> Thresholds:
         return SignalThreshold(value + 0.001, (value - 1, value + 1), 0.1, "free.csv", tail)
 
     return Thresholds(
-        rate=1.0,
+        rate=1.0, of_vendor=own, logged_wrench=own,
         joints=tuple(one(j) for j in range(1, joints + 1)),
-        axes=tuple(one(10.0 + k) for k in range(axes)),
-        force=(one(30.0),) if axes else (),
-        of_vendor=own,
-        logged_wrench=own,
-    )
+        axes=tuple(one(10.0 + k) for k in range(axes)), force=(one(30.0),) if axes else (),
+    )  # fmt: skip
 
 
 def test_a_franka_gets_contacts_at_the_threshold_and_collisions_at_its_upper_end() -> None:
@@ -103,18 +100,15 @@ def test_what_is_wide_is_no_threshold_and_in_no_call() -> None:
 
 
 def check(reference: str | None = "sensor") -> ThresholdDetection:
-    return ThresholdDetection(
-        log="pushed.csv",
-        reference=reference,
-        contacts=(
-            CheckedContact(1.0, 2.0, 40.0, 0.05, "J2"),
-            CheckedContact(4.0, 5.0, 12.0, NAN, ""),
-            CheckedContact(7.0, 8.0, 20.0, 0.15, "fz"),
-        ),
-        false_alarms=2 if reference else None,
-        untouched_h=0.5 if reference else NAN,
-        remarks=(),
+    contacts = (
+        CheckedContact(1.0, 2.0, 40.0, 0.05, "J2"),
+        CheckedContact(4.0, 5.0, 12.0, NAN, ""),
+        CheckedContact(7.0, 8.0, 20.0, 0.15, "fz"),
     )
+    counts = {"false_alarms": 2, "untouched_h": 0.5}
+    counts = counts if reference else {"false_alarms": None, "untouched_h": NAN}
+    found = {"log": "pushed.csv", "reference": reference, "contacts": contacts, "remarks": ()}
+    return ThresholdDetection(**found | counts)
 
 
 def test_the_record_has_the_keys_of_the_contract_and_is_strict_json() -> None:

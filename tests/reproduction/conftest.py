@@ -36,44 +36,25 @@ PAPER = Paper(
     name="cheap",
     title="A paper",
     doi="10.1/1",
-    experiments={
-        e.name: e
-        for e in (
-            Experiment(name="works", title="what works", run="measure", seeds=(1, 2, 3)),
-            Experiment(
-                name="fails",
-                title="what fails",
-                run="fail",
-                given={"what": "nothing"},
-                seeds=(1, 2),
-            ),
-            Experiment(
-                name="timed", title="what takes the time", run="measure", seeds=(0,), alone=True
-            ),
-        )
-    },
+    experiments={e.name: e for e in (
+        Experiment(name="works", title="what works", run="measure", seeds=(1, 2, 3)),
+        Experiment(name="fails", title="what fails", run="fail", given={"what": "nothing"},
+                   seeds=(1, 2)),
+        Experiment(name="timed", title="what takes the time", run="measure", seeds=(0,),
+                   alone=True),
+    )},
     items={
         "fig1": PaperItem(
-            label="Fig. 1",
-            title="A <figure>",
-            why="Because.",
-            verdict="in size",
-            experiments=("works",),
-            lines=(PrintedLine("a", "alpha", "N", "2"), PrintedLine("b", "beta", "", "-1")),
-            traces="Two panels",
-        ),
+            label="Fig. 1", title="A <figure>", why="Because.", verdict="in size",
+            experiments=("works",), traces="Two panels",
+            lines=(PrintedLine("a", "alpha", "N", "2"), PrintedLine("b", "beta", "", "-1"))),
         "fig2": PaperItem(label="Fig. 2", title="Another", why="A sketch.", verdict="a picture"),
         "fig3": PaperItem(
-            label="Fig. 3",
-            title="Half of it",
-            why="Why not.",
-            verdict="no",
-            experiments=("timed", "fails"),
-            lines=(PrintedLine("a", "alpha", "N"),),
-        ),
+            label="Fig. 3", title="Half of it", why="Why not.", verdict="no",
+            experiments=("timed", "fails"), lines=(PrintedLine("a", "alpha", "N"),)),
     },
     setting=("It is set.",),
-)
+)  # fmt: skip
 
 
 @pytest.fixture

@@ -22,11 +22,8 @@ def test_an_arm_is_back_at_a_tenth_left_where_it_rests_and_moved_by_knocks() -> 
         {"controller": "variable", "axis": "y", "peak": 9.0, "release_s": 1.0},
         {"controller": "traditional", "axis": "x", "peak": 9.0, "release_s": 1.0},
     ]
-    found = SimpleNamespace(
-        motion=SimpleNamespace(t=t, x=x),
-        controllers=[SimpleNamespace(kind="variable")],
-        rows=rows,
-    )
+    motion, law = SimpleNamespace(t=t, x=x), SimpleNamespace(kind="variable")
+    found = SimpleNamespace(motion=motion, controllers=[law], rows=rows)
     given = motion_under_knocks(CORRECTED, found, (8.0, 9.4))
     values = {key: value for _, key, value in given}
     assert values["back/variable"] == pytest.approx(4.5, abs=0.011)  # a sample

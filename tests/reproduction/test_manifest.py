@@ -47,16 +47,11 @@ def test_an_entry_with_pushes_is_two_logs(tmp_path: Path) -> None:
 
 def test_an_entry_has_the_keys_of_its_arm_and_its_own_go_before(tmp_path: Path) -> None:
     arm = '[[arm]]\nname = "UR5"\nrobot = "ur5"\nlicence = "MIT"\nfree = ["0:0.1"]\n'
-    theirs, own = made(
-        tmp_path, arm + ENTRY + other("b", "tuesday") + 'licence = "GPL-3.0"\n'
-    ).logs.values()
-    assert (dict(theirs.options), theirs.free, theirs.licence) == (
-        {"robot": "ur5"},
-        ("0:0.1",),
-        "MIT",
-    )
-    assert theirs.protocols == ("alone", "free")
-    assert (dict(own.options), own.licence) == ({"robot": "ur5"}, "GPL-3.0")
+    text = arm + ENTRY + other("b", "tuesday") + 'licence = "GPL-3.0"\n'
+    theirs, own = made(tmp_path, text).logs.values()
+    assert dict(theirs.options) == dict(own.options) == {"robot": "ur5"}
+    assert (theirs.free, theirs.protocols) == (("0:0.1",), ("alone", "free"))
+    assert (theirs.licence, own.licence) == ("MIT", "GPL-3.0")
 
 
 @pytest.mark.parametrize("name", ["sim", "field"])
@@ -72,37 +67,34 @@ def test_built_in_manifests_are_whole(name: str, tmp_path: Path) -> None:
     )
 
 
-@pytest.mark.parametrize(
-    ("text", "complaint"),
-    [
-        ("", "no [[log]]"),
-        ("[[logs]]\n", "Did you mean log?"),
-        ("[log]\n", "log is not a list of tables; write [[log]]"),
-        ("log = [3]\n", "log is not a list of tables; write [[log]]"),
-        (ENTRY + '[[arm]]\nname = "UR3"\n', "no log of arm 'UR3'; there is UR5"),
-        (ENTRY + '[[arm]]\nrobot = "ur3"\n', "no log of arm ''; there is UR5"),
-        (ENTRY + '[[arm]]\nname = "UR5"\nfole = 3\n', "log a.fole"),
-        (ENTRY.replace("free", "guess"), "truth 'guess'"),
-        (ENTRY + "fole = 3\n", "log a.fole"),
-        (ENTRY + 'scenario = "ur5-circle"\n', "one of file, parts, scenario"),
-        (ENTRY + "score = [[1]]\n", "log a.score"),
-        (ENTRY + ENTRY, "two logs are called a"),
-        (ENTRY + 'free = ["z"]\n', "no free log 'z'"),
-        (ENTRY + 'identified = "z"\n', "no [[robot]] 'z'"),
-        ('[[log]]\narm = "x"\ntruth = "free"\n', "log.name is missing"),
-        (ENTRY.replace('"a"', '"../a"'), "a name has letters"),
-        ("x = \n", "not valid TOML"),
-        (ENTRY.replace("free", "weight"), "weight_N is missing"),
-        (ENTRY + 'protocols = ["identified"]\n', "identified is missing"),
-        (ENTRY + 'protocols = ["both"]\n', "protocol 'both'"),
-        (ENTRY + "score = [[20, 10]]\n", "last longer than 0 s"),
-        (ENTRY + "score = [[10, 10]]\n", "last longer than 0 s"),
-        (ENTRY + "contacts = [[5, 4]]\n", "last longer than 0 s"),
-        (ENTRY + "contacts = [[1]]\n", "log a.contacts[0] has 1 entries; it must have 3"),
-        (ENTRY + "pushes = [[1, 0, [1, 0, 0]]]\n", "longer than 0 s"),
-        (ENTRY.replace('file = "a.csv"', 'parts = ["t"]'), "t=time.txt"),
-    ],
-)
+@pytest.mark.parametrize(("text", "complaint"), [
+    ("", "no [[log]]"),
+    ("[[logs]]\n", "Did you mean log?"),
+    ("[log]\n", "log is not a list of tables; write [[log]]"),
+    ("log = [3]\n", "log is not a list of tables; write [[log]]"),
+    (ENTRY + '[[arm]]\nname = "UR3"\n', "no log of arm 'UR3'; there is UR5"),
+    (ENTRY + '[[arm]]\nrobot = "ur3"\n', "no log of arm ''; there is UR5"),
+    (ENTRY + '[[arm]]\nname = "UR5"\nfole = 3\n', "log a.fole"),
+    (ENTRY.replace("free", "guess"), "truth 'guess'"),
+    (ENTRY + "fole = 3\n", "log a.fole"),
+    (ENTRY + 'scenario = "ur5-circle"\n', "one of file, parts, scenario"),
+    (ENTRY + "score = [[1]]\n", "log a.score"),
+    (ENTRY + ENTRY, "two logs are called a"),
+    (ENTRY + 'free = ["z"]\n', "no free log 'z'"),
+    (ENTRY + 'identified = "z"\n', "no [[robot]] 'z'"),
+    ('[[log]]\narm = "x"\ntruth = "free"\n', "log.name is missing"),
+    (ENTRY.replace('"a"', '"../a"'), "a name has letters"),
+    ("x = \n", "not valid TOML"),
+    (ENTRY.replace("free", "weight"), "weight_N is missing"),
+    (ENTRY + 'protocols = ["identified"]\n', "identified is missing"),
+    (ENTRY + 'protocols = ["both"]\n', "protocol 'both'"),
+    (ENTRY + "score = [[20, 10]]\n", "last longer than 0 s"),
+    (ENTRY + "score = [[10, 10]]\n", "last longer than 0 s"),
+    (ENTRY + "contacts = [[5, 4]]\n", "last longer than 0 s"),
+    (ENTRY + "contacts = [[1]]\n", "log a.contacts[0] has 1 entries; it must have 3"),
+    (ENTRY + "pushes = [[1, 0, [1, 0, 0]]]\n", "longer than 0 s"),
+    (ENTRY.replace('file = "a.csv"', 'parts = ["t"]'), "t=time.txt"),
+])  # fmt: skip
 def test_a_wrong_entry_is_refused_in_one_line(tmp_path: Path, text: str, complaint: str) -> None:
     with pytest.raises(ParameterError) as error:
         made(tmp_path, text)
@@ -121,26 +113,17 @@ ROBOT = '[[robot]]\nname = "r"\ntrain = ["{}"]\n'
 IDENTIFIED, SCORED = ENTRY + 'identified = "r"\n', ENTRY + "score = [[10, 20]]\n"
 
 
-@pytest.mark.parametrize(
-    ("text", "line"),
-    [
-        # Another name for the scored file.
-        (ROBOT.format("b") + IDENTIFIED + other("b", "tuesday"), "another name"),
-        (ENTRY + 'free = ["b"]\n' + other("b", "tuesday"), "another name"),
-        # The same day.
-        (ROBOT.format("c") + IDENTIFIED + other("c", "monday"), "same day"),
-        # The log itself, less than a second from what is scored.
-        (
-            ROBOT.format("a") + IDENTIFIED,
-            "(0 s to the end) must stay 1 s away from score (1 s to",
-        ),
-        (SCORED + 'free = ["20.9:30"]\n', "free (20.9 s to 30 s) must stay 1 s away from score"),
-        (
-            SCORED + 'free = ["0:9.5"]\n',
-            "free (0 s to 9.5 s) must stay 1 s away from score (10 s",
-        ),
-    ],
-)
+@pytest.mark.parametrize(("text", "line"), [
+    # Another name for the scored file.
+    (ROBOT.format("b") + IDENTIFIED + other("b", "tuesday"), "another name"),
+    (ENTRY + 'free = ["b"]\n' + other("b", "tuesday"), "another name"),
+    # The same day.
+    (ROBOT.format("c") + IDENTIFIED + other("c", "monday"), "same day"),
+    # The log itself, less than a second from what is scored.
+    (ROBOT.format("a") + IDENTIFIED, "(0 s to the end) must stay 1 s away from score (1 s to"),
+    (SCORED + 'free = ["20.9:30"]\n', "free (20.9 s to 30 s) must stay 1 s away from score"),
+    (SCORED + 'free = ["0:9.5"]\n', "free (0 s to 9.5 s) must stay 1 s away from score (10 s"),
+])  # fmt: skip
 def test_what_would_be_unfair_is_one_line(tmp_path: Path, text: str, line: str) -> None:
     (found,) = lines(made(tmp_path, text))
     assert found.startswith("a")
@@ -183,17 +166,14 @@ def test_a_rival_says_what_it_was_trained_on(tmp_path: Path) -> None:
     assert line.startswith("a: next was trained on it")
 
 
-@pytest.mark.parametrize(
-    ("words", "complaint"),
-    [
-        ("next", "not NAME=DIR"),
-        ("best={}", "one of our rows"),
-        ("next={}/none", "no folder"),
-        ("next={}", "protocol 'magic'"),
-        ("next={}/empty", "empty has no file; LOG.csv or LOG.parquet is looked for"),
-        ("next={}/other", "other has zz.csv; LOG.csv"),
-    ],
-)
+@pytest.mark.parametrize(("words", "complaint"), [
+    ("next", "not NAME=DIR"),
+    ("best={}", "one of our rows"),
+    ("next={}/none", "no folder"),
+    ("next={}", "protocol 'magic'"),
+    ("next={}/empty", "empty has no file; LOG.csv or LOG.parquet is looked for"),
+    ("next={}/other", "other has zz.csv; LOG.csv"),
+])  # fmt: skip
 def test_a_wrong_rival_is_refused(tmp_path: Path, words: str, complaint: str) -> None:
     (tmp_path / "rival.toml").write_text('protocol = "magic"\n')
     manifest = made(tmp_path, ENTRY)

@@ -27,18 +27,15 @@ def made(cheap):
     return gather(cheap, tuple(cheap.items), results), experiments
 
 
-@pytest.mark.parametrize(
-    ("values", "text"),
-    [
-        ([1.2345], "1.23"),
-        ([1.0, 2.5, 4.0], "2.50 (1 … 4)"),
-        ([-0.5, -0.5], "−0.500"),
-        ([0.25, None], "0.250, 1 of 2"),
-        ([None, None], DASH),
-        ([], DASH),
-        ([18.0], "18"),
-    ],
-)
+@pytest.mark.parametrize(("values", "text"), [
+    ([1.2345], "1.23"),
+    ([1.0, 2.5, 4.0], "2.50 (1 … 4)"),
+    ([-0.5, -0.5], "−0.500"),
+    ([0.25, None], "0.250, 1 of 2"),
+    ([None, None], DASH),
+    ([], DASH),
+    ([18.0], "18"),
+])  # fmt: skip
 def test_a_mean_stands_with_its_range(values, text) -> None:
     assert spread(values) == text
 

@@ -29,14 +29,9 @@ from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.recording import Recording, Source
 
 LOG = BenchmarkLog(
-    name="a",
-    arm="A",
-    truth="sensor",
-    file="a.csv",
-    score=((1.0, 18.0),),
-    vouched=((0.0, 15.0),),
-    weight_N=10.0,
-)
+    name="a", arm="A", truth="sensor", file="a.csv", score=((1.0, 18.0),),
+    vouched=((0.0, 15.0),), weight_N=10.0,
+)  # fmt: skip
 TOUCHED = ((5.0, 7.0, 20.0), (12.0, 13.0, np.nan))
 
 
@@ -87,9 +82,8 @@ def test_every_row_is_that_of_plain_numpy() -> None:
             assert sum(row["missing"]) == pytest.approx(mine[silent].sum())
     # What is late by .03 s fits best .03 s later, but for the noiseless gap of .5 s.
     assert LAGS[np.argmin(found["lag"]["lag_squares"])] == pytest.approx(0.03)
-    assert found["lag"]["lag_squares"][10] == pytest.approx(
-        (w[scored, None] * error[scored] ** 2).sum()
-    )
+    unshifted = (w[scored, None] * error[scored] ** 2).sum()
+    assert found["lag"]["lag_squares"][10] == pytest.approx(unshifted)
     f, known = np.nan_to_num(answer.wrench)[touch], np.isfinite(answer.wrench[touch, 0])
     for axis in range(6):
         row, own = found["wrench", axis + 1], truth.wrench[touch, axis]
@@ -164,9 +158,8 @@ def test_a_torque_alone_shows_its_contacts(tmp_path: Path) -> None:
     tau[150:160, 4] = 0.03
     tau[160:170, 4] = 0.02
     tau[250:300, 2] = 0.04  # below where one starts
-    truth = read_truth(
-        tmp_path / "truth.csv", {"t": t, "tau": tau}, "t,tau_ext:6", truth="torque"
-    )
+    found = {"t": t, "tau": tau}
+    truth = read_truth(tmp_path / "truth.csv", found, "t,tau_ext:6", truth="torque")
     assert truth.tau == pytest.approx(tau)
     assert [x[:2] for x in truth.contacts] == [pytest.approx((1.0, 1.6))]
     assert np.isnan(truth.contacts[0][2])
@@ -211,9 +204,7 @@ def test_a_planted_push_is_half_a_sine_at_the_flange_and_missing_in_the_drives(
 
 
 @pytest.mark.parametrize(("apart", "own"), [(0.9e-6, True), (1.1e-6, False)])
-def test_stamps_within_a_microsecond_are_the_logs_own(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, apart: float, own: bool
-) -> None:
+def test_stamps_within_a_microsecond_are_the_logs_own(tmp_path, monkeypatch, apart, own) -> None:
     """Else what another program says is read off between its samples."""
     t = 0.01 * np.arange(50)
     steps = np.where(np.arange(50)[:, None] % 2, 1.0, 0.0) * np.ones(6)
@@ -229,30 +220,23 @@ def test_stamps_within_a_microsecond_are_the_logs_own(
     assert (answer.about, answer.lists) == ({"future": False}, {"list": listed})
 
 
-def test_the_lists_of_the_best_estimate_keep_peaks_and_bands(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_the_lists_of_the_best_estimate_keep_peaks_and_bands(monkeypatch) -> None:
     """A contact of unknown force is listed with 0 N; candidates are sorted in by time."""
     contact = SimpleNamespace(start=3.0, stop=4.0, peak_force=17.0, peak_band=4.0, is_load=False)
     unknown = SimpleNamespace(start=1.0, stop=2.0, peak_force=None, peak_band=None, is_load=True)
-    t = 0.01 * np.arange(500)
+    t, tau = 0.01 * np.arange(500), np.zeros((500, 6))
     made = SimpleNamespace(
         wrenches=(),
         motion=SimpleNamespace(log=SimpleNamespace(terms=None)),
         observers=[SimpleNamespace(estimate=lambda _: None)] * 2,
         contacts=SimpleNamespace(contacts=[contact], candidates=[unknown]),
-        estimates=[
-            ExternalTorque(name=name, t=t, tau=np.zeros((500, 6))) for name in ("best", "gmo")
-        ],
+        estimates=[ExternalTorque(name=name, t=t, tau=tau) for name in ("best", "gmo")],
     )
     monkeypatch.setattr(scoring, "analyse", lambda *_: made)
-    run = Run(recording=Recording(t=t, q=np.zeros((500, 6))), robot=load_robot("ur5"))
+    run = Run(recording=Recording(t=t, q=tau), robot=load_robot("ur5"))
     answers = own_answers(run, AnalysisChoice(), LOG)
     lists = {answer.torque.name: answer.lists for answer in answers}
     listed = ListedRow(3.0, 4.0, 17.0, 4.0)
     both = [ListedRow(1.0, 2.0, 0.0, 0.0, is_load=True), listed]
-    assert lists == {
-        "zero": {},
-        "gmo": {},
-        "best": {"list": [listed], "list with candidates": both},
-    }
+    best = {"list": [listed], "list with candidates": both}
+    assert lists == {"zero": {}, "gmo": {}, "best": best}

@@ -25,9 +25,7 @@ TERMS = dynamics_terms(LOG, UR5)
 STEP = LOG.median_step
 
 
-def test_every_observer_has_its_time_with_the_dynamics_in_it(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_every_observer_has_its_time_with_the_dynamics_in_it(monkeypatch) -> None:
     """By a clock on which every call takes a second; the printed way runs over an eighth."""
     ticks = counter()
     monkeypatch.setattr("time.perf_counter", lambda: float(next(ticks)))
@@ -95,8 +93,6 @@ def test_the_held_matrices_are_those_of_an_integrator_pair() -> None:
     A, B, Q = held_matrices(h, q_p, q_tau)
     np.testing.assert_allclose(A, [[1, h], [0, 1]], atol=1e-15)
     np.testing.assert_allclose(B, [[h], [0]], atol=1e-15)
-    exact = [
-        [q_p[0] * h + q_tau[0] * h**3 / 3, q_tau[0] * h**2 / 2],
-        [q_tau[0] * h**2 / 2, q_tau[0] * h],
-    ]
+    across = q_tau[0] * h**2 / 2
+    exact = [[q_p[0] * h + q_tau[0] * h**3 / 3, across], [across, q_tau[0] * h]]
     np.testing.assert_allclose(Q, exact, rtol=1e-12)

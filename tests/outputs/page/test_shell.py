@@ -16,17 +16,14 @@ from vftcli.signals.remarks import fact, warning
 HOSTILE = "<b>&</script>\u2028"
 
 
-@pytest.mark.parametrize(
-    "html",
-    [
-        part("parts/top", (HOSTILE,), HOSTILE, part("parts/lead", HOSTILE)),
-        part("parts/pairs", {HOSTILE: HOSTILE}),
-        part("parts/bullets", [HOSTILE]),
-        part("parts/section", HOSTILE, "x", HOSTILE),
-        page("page.html", HOSTILE),
-        part("parts/provenance", {"command": HOSTILE, "versions": {HOSTILE: HOSTILE}}),
-    ],
-)
+@pytest.mark.parametrize("html", [
+    part("parts/top", (HOSTILE,), HOSTILE, part("parts/lead", HOSTILE)),
+    part("parts/pairs", {HOSTILE: HOSTILE}),
+    part("parts/bullets", [HOSTILE]),
+    part("parts/section", HOSTILE, "x", HOSTILE),
+    page("page.html", HOSTILE),
+    part("parts/provenance", {"command": HOSTILE, "versions": {HOSTILE: HOSTILE}}),
+])  # fmt: skip
 def test_no_word_from_outside_becomes_an_element(html: str) -> None:
     assert "<b>" not in html
     assert "&lt;b&gt;&amp;" in html
