@@ -34,9 +34,6 @@ def test_compare_draws_into_a_folder_and_nowhere_else(run, tmp_path: Path) -> No
     assert run(*words, "--figures", "svg", "-o", tmp_path / "out")[0] == 0
     names = sorted(path.name for path in tmp_path.rglob("*.*"))
     assert names == ["errors-double.svg", "errors-single.svg"]
-    for half in (("--figures", "svg"), ("-o", tmp_path / "out")):
-        code, _, err = run(*words, *half)
-        assert (code, "need each other" in err) == (2, True)
 
 
 def test_admit_prints_two_tables_for_latex_and_draws_the_release(run, tmp_path: Path) -> None:

@@ -197,13 +197,11 @@ def test_the_answer_needs_neither_scipy_nor_rerun_and_no_file(command: str, tmp_
         "    heavy = {'scipy', 'rerun', 'pinocchio', 'matplotlib'} & sys.modules.keys()\n"
         "    raise files.OutputError(f'the disk is full; loaded: {sorted(heavy)}')\n"
         "files.OutputFolder.__enter__ = refuse\n"
-        "from vftcli.cli import launch\n"
-        "launch()\n"
     )
     words = [command, CIRCLE, "--robot", "ur5", "-o", "out"]
     if command == "report":
         words += ["--reference", "two-cycle"]
-    done = launched(*words, begin=("-c", script), cwd=tmp_path)
+    done = launched(*words, begin=("-c", script + PROGRAM), cwd=tmp_path)
     assert "12 contacts" in done.stdout
     assert done.returncode == 1
     assert "loaded: []" in done.stderr
@@ -219,11 +217,10 @@ def test_the_first_lines_come_before_any_observer(words: tuple[str, ...], tmp_pa
         "def refuse(*_):\n"
         "    raise pipeline.VftError(f'no observer; tables: {\"polars\" in sys.modules}')\n"
         "pipeline.observe = refuse\n"
-        "from vftcli.cli import launch\n"
-        "launch()\n"
     )
     command, *more = words
-    done = launched(command, CIRCLE, *more, "-o", "out", begin=("-c", script), cwd=tmp_path)
+    begin = ("-c", script + PROGRAM)
+    done = launched(command, CIRCLE, *more, "-o", "out", begin=begin, cwd=tmp_path)
     assert "12 contacts. The hardest, at 5.1 s" in done.stdout
     assert done.returncode == 1
     assert done.stderr.splitlines()[-1] == "error: no observer; tables: False"
@@ -232,14 +229,10 @@ def test_the_first_lines_come_before_any_observer(words: tuple[str, ...], tmp_pa
 @pytest.mark.slow
 def test_a_recording_is_written_without_pandas(tmp_path: Path) -> None:
     """Pyarrow imports it for others wherever it is installed, as beside most notebooks."""
-    script = (
-        "import atexit, sys\n"
-        "atexit.register(lambda: print('rerun' in sys.modules, 'pandas' in sys.modules))\n"
-        "from vftcli.cli import launch\n"
-        "launch()\n"
-    )
+    last = "print('rerun' in sys.modules, 'pandas' in sys.modules)"
+    script = f"import atexit, sys\natexit.register(lambda: {last})\n"
     words = ("report", CIRCLE, "--robot", "ur5", "--interval", "0:4", "-o", tmp_path / "out")
-    done = launched(*words, begin=("-c", script))
+    done = launched(*words, begin=("-c", script + PROGRAM))
     assert done.stdout.endswith("True False\n")
     assert "Warning" not in done.stderr
     assert (tmp_path / "out" / "recording.rrd").stat().st_size

@@ -35,24 +35,17 @@ from vftcli.wrench import FIT, WrenchChoice
 
 ROOT = Path(__file__).parents[2]
 READING = {
-    "estimate": ("-o", "out"),
-    "compare": ("--reference", "zero"),
-    "report": ("-o", "out"),
-    "admit": (),
-    "identify": ("-o", "robot.toml", "--method", "payload"),
-    "inspect": (),
-    "thresholds": (),
-    "convert": ("-o", "log.parquet"),
-    "contacts": (),
-}
+    "estimate": ("-o", "out"), "compare": ("--reference", "zero"), "report": ("-o", "out"),
+    "identify": ("-o", "robot.toml", "--method", "payload"), "convert": ("-o", "log.parquet"),
+    "admit": (), "inspect": (), "thresholds": (), "contacts": (),
+}  # fmt: skip
 """Command that reads a log → what else it has to be given."""
-OWN = {("simulate", "--set"), ("identify", "--gains"), ("simulate", "--output"),
-       ("admit", "--output"), ("identify", "--output"), ("convert", "--output"),
-       ("inspect", "--output"), ("compare", "--output"),
-       ("annotate", "--output"), ("batch", "--output"), ("reproduce", "--output"),
-       ("benchmark", "--output"),
-       ("report", "--csv"), ("estimate", "--csv"), ("compare", "--csv"),
-       ("contacts", "--csv")}  # fmt: skip
+WRITING = "simulate admit identify convert inspect compare annotate batch reproduce benchmark"
+OWN = {
+    ("simulate", "--set"), ("identify", "--gains"),
+    *((command, "--output") for command in WRITING.split()),
+    *((command, "--csv") for command in ("report", "estimate", "compare", "contacts")),
+}  # fmt: skip
 """Options that are a command's own: --set of a scenario, the goal of --method gains, what is
 written where, and --csv, which the contract makes a file of `estimate` and a table of the others.
 """
@@ -141,16 +134,16 @@ def test_a_shared_option_reads_alike_in_every_command() -> None:
 
 
 @pytest.mark.parametrize("command", READING)
-def test_a_command_that_reads_a_log_reads_it_as_all_do(command: str) -> None:
-    common = {"log.format", "--columns", "--interval", "--json", "--details", "--quiet"}
-    assert set(parameters(command)) >= common
-
-
-@pytest.mark.parametrize("command", ["estimate", "compare", "report", "admit"])
-def test_a_command_that_estimates_takes_all_that_can_be_asked(command: str) -> None:
-    whole = {*BAD, "--causal", "--wrench", "--as-printed"}
-    whole -= {"--reference", "--figures", "recording.detail"}  # what is compared, shown, written
-    assert set(parameters(command)) >= whole
+def test_a_command_takes_all_that_can_be_asked_of_a_log_and_of_an_estimate(command: str) -> None:
+    asked = {"log.format", "--columns", "--interval", "--json", "--details", "--quiet"}
+    if command in {"estimate", "compare", "report", "admit"}:
+        asked |= {*BAD, "--causal", "--wrench", "--as-printed"}
+        asked -= {
+            "--reference",
+            "--figures",
+            "recording.detail",
+        }  # what is compared, shown, written
+    assert set(parameters(command)) >= asked
 
 
 OF_OTHER_TOOLS = {"--binary", "--storage", "--help", "--all-extras", "--dist", "--nthreads",
@@ -297,10 +290,8 @@ def test_a_former_option_does_what_its_setting_does(run) -> None:
     assert (code, expected == run("contacts", TAPS, *SHORT)[1]) == (0, False)
     code, out, err = run(TAPS, *SHORT, "--effort", "current", "--friction=none")
     assert (code, out) == (0, expected)
-    assert err.splitlines() == [
-        "note: --effort is now --set log.effort=…",
-        "note: --friction is now --set model.friction=…",
-    ]
+    now = {"effort": "log.effort", "friction": "model.friction"}
+    assert err.splitlines() == [f"note: --{then} is now --set {x}=…" for then, x in now.items()]
     said = run("admit", "--closed-loop=x.toml")[2]
     assert "note: --closed-loop is now the argument x.toml" in said
 
@@ -376,10 +367,11 @@ LOG = str(CIRCLE)
     (("report", "--robot", "my_"), set()),  # the shell offers files
 ])  # fmt: skip
 def test_values_are_offered(words: tuple[str, ...], values: set[str]) -> None:
+    typed = " ".join(("vftcli", *words))
     asked = {
         "_VFTCLI_COMPLETE": "complete_bash",
-        "COMP_WORDS": " ".join(("vftcli", *words)),
-        "COMP_CWORD": str(len(words)),
+        "COMP_WORDS": typed,
+        "COMP_CWORD": f"{len(words)}",
     }
     shell = {"capture_output": True, "text": True, "env": {**os.environ, **asked}}
     done = subprocess.run([sys.executable, "-c", PROGRAM], check=False, **shell)

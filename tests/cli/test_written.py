@@ -79,17 +79,14 @@ def test_a_second_log_is_offered_as_free_motion(run, here: Path, logs: Path) -> 
     named = ("load_14harm.csv", "free_14harm.csv", "push_pose.csv")
     code, out, err = run("inspect", *named, "--robot", "ur10e", "--json", "-o", NAME)
     assert code == 0
-    found = {
-        "robot": "ur10e",
-        "columns": "t,q:6,dq:6,current:6,target_current:6,target_torque:6",
-        "free": ["free_14harm.csv"],
-        "reference": "two-cycle",
-    }
+    columns = "t,q:6,dq:6,current:6,target_current:6,target_torque:6"
+    found = {"robot": "ur10e", "columns": columns, "free": ["free_14harm.csv"]}
+    found["reference"] = "two-cycle"
     assert options(here) == found == json.loads(out)["options"]
     assert '# free = ["push_pose.csv"]' in (here / NAME).read_text("utf-8")
     asked = ("load_14harm.csv", "--observer", "gmo", "--set", "contacts.list=no")
     assert run("report", *asked, "-o", "kept")[0] == 0
-    typed = ["--robot", "ur10e", "--columns", found["columns"], "--free", "free_14harm.csv"]
+    typed = ["--robot", "ur10e", "--columns", columns, "--free", "free_14harm.csv"]
     (here / NAME).unlink()
     assert run("report", *asked, "-o", "typed", *typed, "--reference", "two-cycle")[0] == 0
     for file in ("errors.csv", "estimates.parquet"):

@@ -63,9 +63,7 @@ def axis_errors(made: JacobianJudgement, name: str = "rmse") -> np.ndarray:
 
 
 @pytest.mark.parametrize("angular_first", [False, True])
-def test_the_sensor_s_axes_are_found_and_its_offset_stays(
-    tmp_path: Path, angular_first: bool
-) -> None:
+def test_the_sensor_s_axes_are_found_and_its_offset_stays(tmp_path, angular_first) -> None:
     made = judged(opened(made_log(tmp_path, angular_first=angular_first)))
     # Exactly the offset that was put in; sixteen digits were written.
     np.testing.assert_allclose(axis_errors(made), 0.2, atol=1e-9)
@@ -106,9 +104,7 @@ def test_a_log_that_lacks_a_part_is_refused(tmp_path: Path, lost: str) -> None:
     ("fy", float("nan"), "wrench axis 2 is nan in sample 201"),
     ("timestamp", 1e300, "time runs backwards"),
 ])  # fmt: skip
-def test_a_value_that_nobody_measured_is_refused_in_one_line(
-    tmp_path: Path, column: str, value: float, reported: str
-) -> None:
+def test_a_value_that_nobody_measured_is_refused_in_one_line(tmp_path, column, value, reported):
     path = made_log(tmp_path)
     table = pl.read_csv(path).with_row_index()
     put = pl.when(pl.col("index") == 200).then(value).otherwise(pl.col(column))
@@ -130,9 +126,7 @@ def test_a_header_alone_is_refused(tmp_path: Path) -> None:
     ("traj_raw.csv", ((0.340, 0.294, 0.556), (0.227, 0.264, 0.370))),
     ("press_1.csv", ((0.242, 0.196, 0.315), (0.174, 0.196, 0.228))),
 ])  # fmt: skip
-def test_a_vendor_s_wrench_beside_an_ati_sensor(
-    logs: Path, name: str, forces: tuple[tuple[float, ...], tuple[float, ...]]
-) -> None:
+def test_a_vendor_s_wrench_beside_an_ati_sensor(logs: Path, name: str, forces) -> None:
     made = judged(opened(logs / "panda_ati" / name))
     rms, bias = axis_errors(made)[:3], axis_errors(made, "bias")[:3]
     np.testing.assert_allclose(rms, forces[0], atol=1e-3)  # three digits were noted

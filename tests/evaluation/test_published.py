@@ -9,11 +9,8 @@ from vftcli.observers import FilteredDynamicsObserver, KalmanObserver, MomentumO
 from vftcli.signals.errors import ParameterError
 
 STEP = 0.008
-OBSERVERS = (
-    FilteredDynamicsObserver(omega=10.0),
-    MomentumObserver(gain=np.array([5.0, 3.0, 4.0, 10.0, 10.0, 10.0])),
-    KalmanObserver(),
-)
+GMO = MomentumObserver(gain=np.array([5.0, 3.0, 4.0, 10.0, 10.0, 10.0]))
+OBSERVERS = (FilteredDynamicsObserver(omega=10.0), GMO, KalmanObserver())
 TUNINGS = {o.name: o.tuning(STEP, 6) for o in OBSERVERS}
 
 

@@ -34,9 +34,7 @@ from vftcli.wrench.solvers import VirtualSensor
 
 @pytest.mark.parametrize("zero", [0.0, 0.02, 798.467])
 @pytest.mark.parametrize("every", [1, 3])
-def test_a_file_may_count_from_the_first_sample_or_be_on_the_logs_clock(
-    zero: float, every: int
-) -> None:
+def test_a_file_may_count_from_the_first_sample_or_be_on_the_logs_clock(zero, every) -> None:
     t = np.arange(0.0, 5.0, 0.0137)
     source = Source(format="x", clock="x", rows=len(t), duplicates=0, t0=zero)
     log = Recording(t=t, q=np.zeros((len(t), 6)), source=source)

@@ -144,13 +144,9 @@ def test_a_row_names_size_range_and_places() -> None:
 def test_a_direction_names_its_large_axes() -> None:
     """More than .35 of the force: 0.35² is an eighth of its square."""
     named = {
-        (0.4, 51.9, -38.8): "+y, down",
-        (3.0, -4.0, 3.0): "−y, +x, up",
-        (0.0, 0.0, 2.0): "up",
-        (1.0, 9.0, 0.0): "+y",
-        (-9.0, 1.0, 0.0): "−x",
-        (0.0, 0.0, 0.0): "–",
-    }
+        (0.4, 51.9, -38.8): "+y, down", (3.0, -4.0, 3.0): "−y, +x, up", (0.0, 0.0, 2.0): "up",
+        (1.0, 9.0, 0.0): "+y", (-9.0, 1.0, 0.0): "−x", (0.0, 0.0, 0.0): "–",
+    }  # fmt: skip
     assert {force: contacts.direction(np.array(force)) for force in named} == named
 
 

@@ -49,12 +49,9 @@ def test_plots_and_words_of_two_clocks_read_back(tmp_path: Path) -> None:
 def test_the_viewer_gets_letters_it_can_draw() -> None:
     """Viewer 0.41 stops at a letter its font lacks; Latin-1 and Greek were seen to be drawn."""
     drawn = {
-        "J2 [N·m] ±0.5 τ²": "J2 [N·m] ±0.5 τ²",
-        "Jᵀ ≤ −1 → √2": "J^T <= -1 -> sqrt 2",
-        "ṗ = μ": "p = μ",
-        "日志.csv\t\x00": "??.csv??",
-        "a\nb": "a\nb",
-    }
+        "J2 [N·m] ±0.5 τ²": "J2 [N·m] ±0.5 τ²", "Jᵀ ≤ −1 → √2": "J^T <= -1 -> sqrt 2",
+        "ṗ = μ": "p = μ", "日志.csv\t\x00": "??.csv??", "a\nb": "a\nb",
+    }  # fmt: skip
     assert {text: drawable(text) for text in drawn} == drawn
 
 

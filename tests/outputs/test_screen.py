@@ -178,9 +178,7 @@ def test_a_hundred_logs_are_one_screen(without_reference: Analysis, as_if) -> No
     assert lines[23:25] == ["", "Can it be believed?"]
 
 
-def test_several_logs_tell_their_errors_where_there_is_a_reference(
-    analysis: Analysis, as_if
-) -> None:
+def test_several_logs_tell_their_errors_where_there_is_a_reference(analysis, as_if) -> None:
     log = named(analysis, "log.csv", as_if)
     lines = logs_screen([log, log], CANVAS, {}).splitlines()
     (block,) = blocks(analysis.errors)

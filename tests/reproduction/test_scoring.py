@@ -181,9 +181,7 @@ def test_a_wrench_shows_contacts_of_the_force_that_the_entry_says(tmp_path: Path
 
 
 @pytest.mark.parametrize(("name", "signal"), [("ur5", "current"), ("panda", "torque")])
-def test_a_planted_push_is_half_a_sine_at_the_flange_and_missing_in_the_drives(
-    name: str, signal: str
-) -> None:
+def test_a_planted_push_is_half_a_sine_at_the_flange_and_missing_in_the_drives(name, signal):
     """Its joint torque by Pinocchio's Jacobian; two pushes that meet add up."""
     robot, t = load_robot(name), np.linspace(0.0, 4.0, 401)
     q = np.linspace(-0.6, 0.5, robot.joints) + 0.1 * t[:, None]

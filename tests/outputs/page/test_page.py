@@ -207,12 +207,8 @@ def test_few_joints_tell_when_but_not_how_hard(pushed: Analysis) -> None:
     assert "–" in part("parts/table", contact_details(bare)[0])
 
 
-def test_the_details_hold_every_number(pushed: Analysis) -> None:
+def test_the_model_of_a_list_is_told(pushed: Analysis) -> None:
     found = pushed.contacts
-    shown = part("parts/table", contact_details(found)[1])
-    first = found.contacts[0]
-    torque, band = first.joint_torque[1], 1.96 * first.joint_torque_sd[1]
-    assert f"{torque:.2f} ± {band:.2f}".replace("-", "−") in shown
     pairs = model_pairs(found)
     assert pairs["basis"] == "free motion"
     assert pairs["free motion"].endswith(" s")
