@@ -54,7 +54,6 @@ def dataset(tmp_path: Path) -> Path:
 
 
 def edited(dataset: Path, column: str, edit: Any) -> None:
-    """Change a column of the first data file in place."""
     path = dataset / FILES[0]
     table = pq.read_table(path)
     values = np.array(table.column(column).to_pylist(), np.float32)

@@ -168,7 +168,6 @@ for address in sys.argv[2:]:
 
 
 def answer_to_http(port: int) -> bytes:
-    """What a port says to who asks it for a page."""
     with socket.create_connection(("127.0.0.1", port), timeout=5) as connection:
         connection.sendall(b"GET /health HTTP/1.0\r\n\r\n")
         try:

@@ -60,7 +60,6 @@ def peak_mib() -> float:
 
 
 def main() -> None:
-    """Read every file that is named, and print what came of each."""
     import pyarrow.parquet  # noqa: F401 - once, not in every child
     import rosbags.typesys  # noqa: F401
 

@@ -24,7 +24,6 @@ def arrow(path: Path, *, stream: bool = False, codec: str | None = "lz4") -> Pat
 def write_arrow(
     path: Path, table: Any, *, stream: bool = False, codec: str | None = None, rows: int = 50
 ) -> Path:
-    """Write a table in batches of some rows."""
     import pyarrow as pa
 
     options = pa.ipc.IpcWriteOptions(compression=codec)
@@ -43,7 +42,6 @@ def json_lines(path: Path) -> Path:
 
 
 def json_arrays(path: Path) -> Path:
-    """panda-py's log, one object of arrays."""
     held = {name: value.tolist() for name, value in panda_py_log().items()}
     path.write_text(json.dumps({"robot": "panda", **held}), encoding="utf-8")
     return path

@@ -53,7 +53,6 @@ def ur_csv(path: Path, *, separator: str = " ", end: str = "\r\n", rows: int = R
 
 
 def rows_of(*columns: np.ndarray, separator: str = ",") -> list[str]:
-    """The lines of a table, with every digit."""
     return [separator.join(map(repr, row)) for row in np.column_stack(columns).tolist()]
 
 
@@ -106,7 +105,6 @@ def libfranka_json(path: Path) -> Path:
 
 
 def table_csv(path: Path) -> Path:
-    """A headed table by aliases."""
     log = motion()
     names = ["t"] + [f"{name}_{j}" for name in ("q", "dq", "tau") for j in range(6)]
     lines = [",".join(names), *rows_of(log["t"], log["q"], log["dq"], log["tau"])]
@@ -120,7 +118,6 @@ def table_gz(path: Path) -> Path:
 
 
 def headerless_csv(path: Path) -> Path:
-    """A table of numbers; HEADERLESS_COLUMNS describes it."""
     log = motion()
     matrix = np.column_stack([log["t"], log["q"], log["dq"], log["current"]])
     path.write_text("\n".join(",".join(f"{v:.6f}" for v in row) for row in matrix) + "\n")
@@ -128,7 +125,6 @@ def headerless_csv(path: Path) -> Path:
 
 
 def matrix_npy(path: Path) -> Path:
-    """The same numbers as an array."""
     log = motion()
     with path.open("wb") as file:
         np.save(file, np.column_stack([log["t"], log["q"], log["dq"], log["current"]]))
@@ -148,14 +144,12 @@ def panda_py_log() -> dict[str, np.ndarray]:
 
 
 def panda_py_npz(path: Path) -> Path:
-    """panda-py's log by np.savez."""
     with path.open("wb") as file:
         np.savez(file, **panda_py_log())
     return path
 
 
 def panda_py_pickle(path: Path) -> Path:
-    """panda-py's log by pickle: lists of arrays."""
     path.write_bytes(pickle.dumps({name: list(value) for name, value in panda_py_log().items()}))
     return path
 
@@ -200,7 +194,6 @@ def write_mcap(
 
 
 def mcap_json(path: Path) -> Path:
-    """JSON documents in an MCAP of several chunks."""
     log, messages = motion(), []
     for k in range(ROWS):
         stamp = 10**9 + round(log["t"][k] * 1e9)
@@ -246,7 +239,6 @@ def bag_messages(ros1: bool) -> tuple[object, list[tuple[str, str, int, object]]
 
 
 def rosbag1(path: Path, *, compression: str = "") -> Path:
-    """A ROS 1 bag of several chunks."""
     from rosbags.rosbag1 import Writer
 
     store, messages = bag_messages(ros1=True)

@@ -140,7 +140,6 @@ def test_a_bag_cut_within_the_index_of_a_chunk_is_read(path):
 
 
 def moved(by: int) -> Callable[[bytes], bytes]:
-    """An index whose last entry points elsewhere."""
     return lambda b: b[:-4] + (int.from_bytes(b[-4:], "little") + by).to_bytes(4, "little")
 
 

@@ -228,7 +228,6 @@ HOSTILE = OF_HDF5 | {
 
 @pytest.fixture(scope="module")
 def readings(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Reading]:
-    """What came of each file, in a process of its own."""
     folder = tmp_path_factory.mktemp("hostile")
     there = [name for name in HOSTILE if name not in OF_HDF5 or find_spec("h5py")]
     return read_apart([HOSTILE[name][0](folder / name) for name in there])

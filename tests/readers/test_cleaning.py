@@ -20,7 +20,6 @@ GARBAGE = 3e19
 
 
 def made(stamps: Any, q: Any, **more: Any) -> Recording:
-    """A raw log, cleaned."""
     signals = {"q": np.asarray(q)} | more.pop("signals", {})
     log = RawLog(stamps=np.asarray(stamps), clock="test", signals=signals, **more)
     return cleaned(log, Path("log"), "test")

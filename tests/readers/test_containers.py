@@ -35,7 +35,6 @@ def h5py() -> None:
 
 
 def made(name: str, path: Path) -> Path:
-    """A container by its name, or a skip where h5py is missing."""
     if name in seeds.NEED_H5PY:
         pytest.importorskip("h5py", reason=NO_H5PY)
     return seeds.SEEDS[name][0](path)

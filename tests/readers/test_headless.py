@@ -34,7 +34,6 @@ def table(joints: int = 6, seed: int = 3) -> Table:
 
 
 def guess(signals: Table, *names: str) -> Guess | None:
-    """What the signals in some order settle."""
     return guess_columns(list(np.hstack([signals[n] for n in names or signals]).T))
 
 

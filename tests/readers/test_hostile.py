@@ -92,7 +92,6 @@ def parquet(path: Path, **changed: object) -> Path:
 
 
 def lists(first: object) -> list[object]:
-    """The positions as lists, the first replaced."""
     return [first, *motion(7)["q"].tolist()[1:]]
 
 
@@ -103,7 +102,6 @@ def npz(path: Path, **changed: object) -> Path:
 
 
 def table(path: Path, clock: Callable[[int], float], rows: int = ROWS) -> Path:
-    """A text table whose clock is a function of the row."""
     log, times = motion(), [float(clock(k)) for k in range(rows)]
     names = ["t", *(f"{name}{j}" for name in ("q", "dq") for j in range(6))]
     lines = [",".join(names), *rows_of(np.array(times), log["q"][:rows], log["dq"][:rows])]

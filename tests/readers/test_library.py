@@ -23,7 +23,6 @@ PATHS = st.lists(NAMES, min_size=1, max_size=4).map(lambda parts: Path("/", *par
 
 @pytest.fixture
 def paths(tmp_path):
-    """The same file name in two folders."""
     found = [tmp_path / name / "log.csv" for name in ("a", "b")]
     for path in found:
         path.parent.mkdir()

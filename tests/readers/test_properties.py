@@ -24,7 +24,6 @@ QUICK = settings(
 
 
 def check_message(error: VftError) -> None:
-    """A message as a command prints it is one line that says something."""
     # A blank that does not break is a letter like another, though Python calls it unprintable.
     assert not any(unicodedata.category(letter) in HIDDEN for letter in printable(str(error)))
     assert len(str(error)) > 20

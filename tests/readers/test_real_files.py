@@ -125,7 +125,6 @@ def test_text_and_binary_of_one_recording_agree(samples):
 
 
 def typed_messages(path: Path, kind: str) -> list[Any]:
-    """The messages of some types as rosbags decodes them."""
     from rosbags.highlevel import AnyReader
 
     with AnyReader([path]) as reader:

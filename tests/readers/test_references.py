@@ -18,7 +18,6 @@ from vftcli.signals.errors import ClockError, LogError
 
 @pytest.fixture
 def write(tmp_path: Path) -> Callable[..., Path]:
-    """Write a table of four rows under some names."""
 
     def made(*names: str, clock: tuple[float, ...] = (0.0, 0.1, 0.2, 0.3)) -> Path:
         rows = [[t, *(t + k for k in range(1, len(names)))] for t in clock]

@@ -70,7 +70,6 @@ def arm_topic(
 
 
 def recorded(path: Path, *topics: list[Message], **how: Any) -> Recording:
-    """What is read of a bag of some topics, in the order of time."""
     messages = sorted((m for topic in topics for m in topic), key=lambda message: message["time"])
     return read(write_joint_states(path, messages), **how)
 

@@ -101,7 +101,6 @@ def test_a_toml_that_does_not_fit_is_refused(tmp_path, toml, words):
 
 
 def flattened(urdf: str, name: str, moments: tuple[float, float, float]) -> str:
-    """The URDF with other principal moments of one link."""
     bad = link(name, 1.0, (moments[0], 0, 0, moments[1], 0, moments[2]))
     before, after = urdf.split(f'<link name="{name}">')
     return before + bad + after.partition("</link>")[2]
@@ -145,7 +144,6 @@ def test_a_negative_moment_is_refused(tmp_path):
 
 
 def without_inertia(urdf: str, *names: str) -> str:
-    """The URDF without what these links weigh."""
     for name in names:
         before, after = urdf.split(f'<link name="{name}">')
         urdf = f'{before}<link name="{name}"/>{after.partition("</link>")[2]}'

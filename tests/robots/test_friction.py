@@ -248,7 +248,6 @@ temperature_at = 44.6
 
 
 def arm_with(friction: str, folder: Path) -> Path:
-    """The Panda, its first joint's friction replaced."""
     head, _, rest = PROFILES["panda"].read_text(encoding="utf-8").partition("[joints.friction]\n")
     _, _, others = rest.partition("\n\n")
     path = folder / "arm.toml"

@@ -28,7 +28,6 @@ def shaped(text: str, name: str, shapes: str) -> str:
 
 
 def meshes_of(folder: Path, shapes: str) -> tuple[Mesh, ...]:
-    """The meshes of an arm with shapes on its second link."""
     text = shaped(robot(link("base"), arm(6)), "link2", shapes)
     return load_robot(written(folder, text)).meshes
 

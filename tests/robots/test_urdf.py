@@ -122,7 +122,6 @@ def test_a_urdf_with_an_error_is_refused_by_the_part(tmp_path, old, new, words, 
     [("fingered", 7), ("knuckled", 7), ("barred", 6), ("clawed", 6), ("mobile", 6)],
 )
 def test_every_shape_is_read_as_pinocchio_reads_it(shape, count, tmp_path):
-    """Hands and bases are no joints of the arm."""
     text = SHAPES[shape]()
     found = load_robot(written(tmp_path, text))
     assert found.chain.names == tuple(f"joint{k}" for k in range(1, count + 1))

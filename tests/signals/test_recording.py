@@ -36,7 +36,6 @@ def test_of_several_the_one_that_is_called_so_stays_alone() -> None:
 
 
 def recording(sha256="", label="", rows=3, t0=0.0):
-    """A recording of three samples, from a file with that digest."""
     source = Source(sha256=sha256, label=label, rows=rows, t0=t0)
     return Recording(t=np.arange(3.0), q=np.zeros((3, 6)), source=source)
 

@@ -56,7 +56,6 @@ def test_torque_stays_inside_the_limits():
 
 
 def arm(*settings):
-    """The arm of a UR5 scenario with these settings."""
     return build_arm(load_scenario("ur5-circle", settings), ROBOT, np.random.default_rng(1))
 
 

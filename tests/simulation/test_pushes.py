@@ -157,7 +157,6 @@ ROBOT, Q, POINT = load_robot("gen3"), np.linspace(-1.0, 0.8, 7), (0.02, 0.05, 0.
 
 
 def wrench_on_arm(spec: ContactSpec, v: Array) -> Array:
-    """A contact's wrench on the arm at a pose and velocities."""
     touching = Touching((spec,), ROBOT.chain, 10.0, np.random.SeedSequence(1))
     data = ROBOT.model.createData()
     pin.computeJointJacobians(ROBOT.model, data, Q)

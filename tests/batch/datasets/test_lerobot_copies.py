@@ -35,7 +35,6 @@ def forces(episodes: Any, seed: int = 1) -> dict[int, dict[str, Any]]:
 
 
 def statistics(episodes: Any) -> dict[int, dict[str, Any]]:
-    """Those of each episode's forces."""
     made = forces(episodes).items()
     return {k: {name: statistics_of(x) for name, x in own.items()} for k, own in made}
 
