@@ -1,8 +1,10 @@
 """Bombs: files that claim or unpack to gigabytes, lead elsewhere, or have no end, read apart."""
 
+import gzip
 import io
 import pickle
 import struct
+import zipfile
 import zlib
 from collections.abc import Callable
 from importlib import import_module
@@ -14,6 +16,7 @@ import numpy as np
 import pyarrow as pa
 import pytest
 import seed_containers as seeds
+import zstandard
 from pyarrow.parquet import write_table
 from reading_child import Reading, read_apart
 from scipy.io import savemat
@@ -88,6 +91,17 @@ def one_chunk(path: Path, packed: bytes, rows: int = ROWS, deflated: int = 1) ->
         space = h5py.h5s.create_simple(motion()["q"].shape, (h5py.h5s.UNLIMITED, 6))
         q = h5py.h5d.create(file.id, b"q", h5py.h5t.NATIVE_DOUBLE, space, settings)
         q.write_direct_chunk((0, 0), packed)
+    return path
+
+
+def long_text() -> bytes:
+    """Half a gibibyte, which shrinks a thousandfold."""
+    return b"t,q1\n" + b"0.1,0.2\n" * (64 << 20)
+
+
+def npz_bomb(path: Path) -> Path:
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as bundle:
+        bundle.writestr("q.npy", bytes(300 << 20))
     return path
 
 
@@ -207,12 +221,18 @@ OF_HDF5: Hostile = {
     "circle": (circle, ROWS),
 }  # fmt: skip
 HOSTILE = OF_HDF5 | {
+    "gzip_bomb": (lambda p: held(p, gzip.compress(long_text())), TOO_MUCH),
+    "zstd_bomb": (lambda p: held(p, zstandard.compress(long_text())), TOO_MUCH),
+    "npz_bomb": (npz_bomb, TOO_MUCH),
     "matlab_bomb": (matlab_bomb, TOO_MUCH),
     "matlab_struct_bomb": (lambda p: matlab_bomb(p, inside=True), TOO_MUCH),
     "matlab_claim": (matlab_claim, TOO_MUCH),
     "arrow_bomb": (lambda p: seeds.write_arrow(p, zeros(), codec="zstd", rows=10**7), TOO_MUCH),
     "arrow_lies": (arrow_lies, TOO_MUCH),
     "parquet_bomb": (lambda p: write_table(zeros(), p) or p, TOO_MUCH),
+    # 24 MiB, which would be .8 GB
+    "json_many": (lambda p: held(p, b'{"q": [' + b"[]," * (8 << 20) + b"[]]}"),
+                  "a JSON document of 24 MiB, too many values to hold"),
     "json_deep": (lambda p: held(p, b'{"q": ' + b"[" * 3_000_000), "nested too deeply"),
     "json_endless_line": (endless_line, 1),  # its cut end is dropped and said
     "empty_array": (lambda p: mcap_of_type(p, EMPTY_ARRAY), "more parts than bytes"),
@@ -220,10 +240,13 @@ HOSTILE = OF_HDF5 | {
     "long_definition": (lambda p: mcap_of_type(p, "float64 a\n" * 7000), "more than 64 KiB"),
     "computed": (computed, "no stored column data"),
     "viewed": (viewed, "without plain tables of a ROS 2 bag"),
+    # numpy.ndarray((10**9,)) without any data
+    "pickled_claim": (lambda p: held(p, b"\x80\x02cnumpy\nndarray\n((I10000000000\ntt R."),
+                      "Pickles are opened only"),
     "pickled_laughs": (pickled_laughs, "more numbers than a file of its size"),
     "pickled_texts": (pickled_texts, "more numbers than a file of its size"),
     "pickled_itself": (pickled_itself, "a list that holds itself"),
-}
+}  # fmt: skip
 
 
 @pytest.fixture(scope="module")

@@ -69,8 +69,10 @@ WRITERS = {"bagpy": bagpy, "rostopic": rostopic, "ros2-echo": ros2_echo}
 
 
 @pytest.mark.parametrize("name", WRITERS)
-def test_the_names_give_the_order_and_the_header_the_clock(name, path):
-    WRITERS[name](path)
+@pytest.mark.parametrize("gripper", [(), ("finger",)])
+def test_the_names_give_the_order_and_the_header_the_clock(name, gripper, path):
+    """A gripper beside UR's joints is set aside."""
+    WRITERS[name](path, (*gripper, *ALPHABETICAL))
     assert recognise(path).name == name
     log = read(path)
     assert log.joint_names == UR_NAMES
@@ -86,13 +88,6 @@ def test_the_names_give_the_order_and_the_header_the_clock(name, path):
     assert stated.current is None
     np.testing.assert_allclose(stated.require("torque"), 2 + Q, atol=1e-15)
     np.testing.assert_allclose(stated.q, Q, atol=1e-15)
-
-
-@pytest.mark.parametrize("name", WRITERS)
-def test_a_gripper_beside_urs_joints_is_set_aside(name, path):
-    log = read(WRITERS[name](path, ("finger", *ALPHABETICAL)))
-    assert log.joint_names == UR_NAMES
-    np.testing.assert_allclose(log.q, Q, atol=1e-15)
 
 
 @pytest.mark.parametrize("name", WRITERS)

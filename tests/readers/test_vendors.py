@@ -2,7 +2,6 @@
 
 import os
 import pickle
-import zipfile
 from collections import OrderedDict
 from pathlib import Path
 
@@ -166,14 +165,6 @@ def test_arrays_of_objects_are_refused(tmp_path):
         read(tmp_path / "x.npz")
 
 
-@pytest.mark.slow
-def test_a_bundle_that_unpacks_beyond_reason_is_refused(tmp_path):
-    with zipfile.ZipFile(tmp_path / "x.npz", "w", zipfile.ZIP_DEFLATED) as bundle:
-        bundle.writestr("q.npy", bytes(300 << 20))
-    with pytest.raises(LogError, match="unpacks to more than 128 MiB"):
-        read(tmp_path / "x.npz")
-
-
 class Evil:
     """A pickle that would make a folder if it were executed."""
 
@@ -199,13 +190,6 @@ def test_a_pickle_larger_than_what_is_held_is_refused(path, monkeypatch):
     monkeypatch.setattr("vftcli.readers.objects.PICKLE_LIMIT", 1 << 21)
     path.write_bytes(pickle.dumps({"q": bytes(3 << 20)}))
     with pytest.raises(LogError, match=r"x: a pickle of 3 MiB\. Save it with np\.savez\.$"):
-        read(path)
-
-
-def test_a_pickle_cannot_fill_memory_through_ndarray(path):
-    # cnumpy\nndarray\n (I1000000000\n t R . : numpy.ndarray((10**9,)) without any data
-    path.write_bytes(b"\x80\x02cnumpy\nndarray\n((I10000000000\ntt R.".replace(b" ", b""))
-    with pytest.raises(LogError, match="Pickles are opened only"):
         read(path)
 
 

@@ -1,5 +1,7 @@
 """Filter, likelihood and smoother against a dense solve; robust least squares."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
@@ -161,14 +163,21 @@ def refitted(A, y, weights, parts):
     return np.sqrt(total / count)
 
 
-def test_cross_validation_equals_fitting_each_time_anew():
-    """One log in fifths, beside one that tells nothing and is always kept."""
+@pytest.mark.parametrize(
+    ("lengths", "edges"),
+    [
+        ([400, 100], range(0, 401, 80)),  # one log in fifths
+        ([303, 157, 40], (0, 303, 460)),  # of several each whole
+        ([157, 303, 40], (0, 157, 460)),
+    ],
+)
+def test_cross_validation_equals_fitting_each_time_anew(lengths, edges):
+    """The last log tells nothing and is always kept."""
     rng, A, _, y = problem(9, 500)
     y = y + rng.normal(size=len(y))
     weights = rng.uniform(0.2, 1.0, len(y))
-    parts = [np.arange(k, k + 80) for k in range(0, 400, 80)]
-    expected = refitted(A, y, weights, parts)
-    found = estimation.left_out([400, 100], [True, False])
+    expected = refitted(A, y, weights, [np.arange(*span) for span in pairwise(edges)])
+    found = estimation.left_out(lengths, [True] * (len(lengths) - 1) + [False])
     # normal equations square the condition number, here 1e2: rounding below 1e-11
     assert estimation.cross_validated(A, y, weights, found) == pytest.approx(expected, rel=1e-9)
     # sums of squares far below 1 count as they are
@@ -182,15 +191,3 @@ def test_the_robust_spread_of_normal_noise():
     noise = np.random.default_rng(1).normal(0, sd, (100_000, 2))
     np.testing.assert_allclose(estimation.robust_sd(noise), sd, rtol=0.02)
     np.testing.assert_array_equal(estimation.robust_sd(noise[:0]), [0.0, 0.0])
-
-
-def test_of_several_logs_each_is_left_out_whole() -> None:
-    """Three logs of 103, 57 and 40 rows, of which the last tells nothing; in either order."""
-    rng = np.random.default_rng(5)
-    A, y, weights = rng.standard_normal((200, 3)), rng.standard_normal(200), np.ones(200)
-    expected = refitted(A, y, weights, [np.arange(103), np.arange(103, 160)])
-    for lengths, rows in (([103, 57, 40], np.arange(200)),
-                          ([57, 103, 40], np.r_[103:160, 0:103, 160:200])):  # fmt: skip
-        parts = estimation.left_out(lengths, [True, True, False])
-        found = estimation.cross_validated(A[rows], y[rows], weights, parts)
-        assert found == pytest.approx(expected, rel=1e-9)
