@@ -36,14 +36,11 @@ WINDOWS = {"literal": (0.45, 0.85), "density": (0.2, 0.45), "discrete": (0.1, 0.
 
 def observer(robot: str, convention: str) -> KalmanObserver:
     """The paper's filter under a noise convention."""
-    return KalmanObserver(
-        discretisation="fe", noise_convention=convention, **load_robot(robot).gains["kfo"]
-    )
+    gains = load_robot(robot).gains["kfo"]
+    return KalmanObserver(discretisation="fe", noise_convention=convention, **gains)
 
 
-def run(
-    name, convention, *, seed=1, duration=0.0, torque="average", zero=(0.5, 3.0)
-) -> ClosedLoop:
+def run(name, convention, *, seed=1, duration=0.0, torque="average", zero=(0.5, 3.0)):
     """A scenario against the profile's variable controller."""
     scenario = replace(load_scenario(name, ()), duration=duration)
     robot = load_robot(scenario.robot)
@@ -62,9 +59,8 @@ def test_online_filter_is_the_batch_filter(convention):
     torque = 20.0 * np.random.default_rng(3).standard_normal((300, 6))
     kalman = observer("ur5", convention)
     recording = Recording(t=t, q=q, dq=dq, torque=torque)
-    batch = kalman.estimate(
-        dynamics_terms(recording, replace(robot, torque_source="joint_torque"))
-    )
+    behind = replace(robot, torque_source="joint_torque")
+    batch = kalman.estimate(dynamics_terms(recording, behind))
     online = OnlineKalman(kalman, robot, 0.008, averaged=False)
     found = np.array([online.sample(*row).copy() for row in zip(q, dq, torque, strict=True)])
     # kernels and Pinocchio differ by 1e-13 N·m·s in p, times L₂ ≈ 1e3 1/s²
@@ -101,9 +97,8 @@ def loop() -> ClosedLoop:
 
 def test_instantaneous_torque_aliases(loop):
     """The servo's answer to each command is over in milliseconds: one sample of it is no mean."""
-    mean, last = (
-        np.abs(each.estimate - each.truth)[each.t > 0.3] for each in (loop, pushed("instant"))
-    )
+    both = loop, pushed("instant")
+    mean, last = (np.abs(each.estimate - each.truth)[each.t > 0.3] for each in both)
     assert loop.stable
     # science of the issue: about 100 N of false force; the mean stays within lag and model error
     assert np.max(last[:, :3]) > 100.0
@@ -244,20 +239,10 @@ def timed_loop(**changed: Any) -> ClosedLoop:
     estimate[(rows >= 310) & (rows < 515), 0] = -1.5 * LIMIT[0]
     moved[:, 1] = np.clip((rows - 319) * 0.01, 0.0, 1.0)
     still = np.zeros((ROWS, 6))
-    run = ClosedLoop(
-        controller=CONTROLLER,
-        t=rows * PERIOD,
-        estimate=estimate,
-        truth=truth,
-        dragged=still > 0,
-        commanded=still,
-        q=still,
-        moved=moved,
-        reached=np.ones(ROWS, dtype=bool),
-        zero=np.zeros(6),
-        simulation=None,
-    )
-    return run._replace(**changed)
+    moves = {"estimate": estimate, "truth": truth, "moved": moved, "reached": rows >= 0}
+    rests = {"dragged": still > 0, "commanded": still, "q": still, "zero": still[0]}
+    known = moves | rests | changed
+    return ClosedLoop(controller=CONTROLLER, t=rows * PERIOD, simulation=None, **known)
 
 
 def test_a_push_is_seen_followed_and_withdrawn():

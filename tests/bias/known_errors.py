@@ -42,14 +42,8 @@ def shortened(robot, joints):
     each = {name: getattr(chain, name)[:n] for name in names}
     limits = Limits(**{key: value[:n] for key, value in vars(robot.limits).items()})
     noise = SensorNoise(**{key: value[:n] for key, value in vars(robot.noise).items()})
-    return replace(
-        robot,
-        chain=replace(chain, **each),
-        torque_constant=robot.torque_constant[:n],
-        friction=robot.friction[:n],
-        limits=limits,
-        noise=noise,
-    )
+    own = {"torque_constant": robot.torque_constant[:n], "friction": robot.friction[:n]}
+    return replace(robot, chain=replace(chain, **each), limits=limits, noise=noise, **own)
 
 
 def wrong_run(robot, error=None, external=None, seconds=30.0, noise=0.0, seed=1, step=STEP):

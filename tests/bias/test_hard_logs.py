@@ -124,13 +124,8 @@ NEAR = 0.5
 @cache
 def sound(path: Path, robot: str, columns: str | None = None):
     """A log, its robot, how it is analysed, and its `best`."""
-    choice = AnalysisChoice(
-        read=ReadChoice.parsed(columns=columns),
-        robot=RobotChoice(name=robot),
-        observers=ObserverChoice(names=("best",)),
-        contacts=False,
-        examiner=Examiner(anyway=True),
-    )
+    asked = {"read": ReadChoice.parsed(columns=columns), "robot": RobotChoice(name=robot)}
+    choice = replace(BEST, **asked, examiner=Examiner(anyway=True))
     (log,) = choice.library.open_each([path], choice.read)
     run = prepared(log.between(0.0, 30.0), choice)  # what a test has time for
     return run.recording, run.robot, choice, analyse(run, choice).estimates[0]

@@ -24,12 +24,8 @@ def one_run(style: str, seed: int) -> tuple[list[float], list[float]]:
     settings = [f"contacts.hand.style={style}", "friction.presliding=0"]
     run = simulate(load_scenario("ur5-circle", settings), seed)
     log, robot, truth = run.recording, run.robot, run.truth.tau_ext
-    asked = AnalysisChoice(
-        observers=ObserverChoice(
-            names=("kfo-zoh", "kfo-rts", "kfo-auto", "rts-auto"),
-            settings={"kfo": {"noise_convention": "density"}},
-        )
-    )
+    names, own = ("kfo-zoh", "kfo-rts", "kfo-auto", "rts-auto"), {"noise_convention": "density"}
+    asked = AnalysisChoice(observers=ObserverChoice(names=names, settings={"kfo": own}))
     motion = read(run_of(log, robot, asked), asked)
     terms, found = motion.log.terms, model(motion, asked)
     observers, _ = asked.observers.build(robot, log.median_step, found.spectra(gains=False))

@@ -40,14 +40,9 @@ def reading(found):
 def corrected(found: Baseline, free, sd: float = 0.0, load: float = 0.0) -> Baseline:
     """The baseline with a correction off that changes nothing but says this of the log."""
     shape, t = found.of(found.motion.log).terms.p.shape, found.motion.log.t
-    off = WholeLogBias(
-        weight=np.zeros(6),
-        bias=np.zeros(shape),
-        sd=np.full(shape, sd),
-        free=free,
-        load=np.full((len(t[:: stride_of(t)]), 6), load),
-        remarks=(),
-    )
+    nothing = {"weight": np.zeros(6), "bias": np.zeros(shape), "remarks": ()}
+    loads = np.full((len(t[:: stride_of(t)]), 6), load)
+    off = WholeLogBias(**nothing, sd=np.full(shape, sd), free=free, load=loads)
     return replace(found, correction=off)
 
 
@@ -130,14 +125,9 @@ def test_friction_beside_another_error_is_its_share_of_the_power():
 
 
 def test_the_largest_cause_of_each_joint_is_named():
-    sizes = {
-        "noise": [3.0, 0.1],
-        "friction": [4.0, 0.2],
-        "model": [0.0, 0.1],
-        "bandwidth": [0.0, 0.5],
-        STICTION: [9.0, 7.0],
-    }
-    causes = {cause: np.array(size) for cause, size in sizes.items()}
+    names = "noise", "friction", "model", "bandwidth", STICTION
+    sizes = np.array([[3.0, 0.1], [4.0, 0.2], [0.0, 0.1], [0.0, 0.5], [9.0, 7.0]])
+    causes = dict(zip(names, sizes, strict=True))
     free = limits_remark("gmo", causes, np.array([False, False]))
     assert free.values["causes"] == ["friction", "bandwidth"]
     assert free.values["size_Nm"] == [4.0, 0.5]
@@ -158,13 +148,9 @@ def test_the_largest_cause_of_each_joint_is_named():
     ("error", "code"), [(3.0, "paper-gains-measured"), (0.7, "paper-gains-measured-level")]
 )
 def test_the_cost_of_the_papers_gains_is_measured_beside_the_best(error, code):
-    rows = [
-        ("best", 1, 0.5),
-        ("best", 2, 1.5),
-        ("gmo", 1, 0.5 * error),
-        ("gmo", 2, 1.5 * error),
-        ("gmo", 3, None),
-    ]
+    sizes = (("best", 1.0), ("gmo", error))
+    rows = [(name, j, j * size - 0.5 * size) for name, size in sizes for j in (1, 2)]
+    rows.append(("gmo", 3, None))
     errors = pl.DataFrame(rows, schema=["observer", "joint", "rmse_Nm"], orient="row")
     unknown = dict.fromkeys(("l1_Nm", "reference_rms_Nm", "reference_floor_Nm"), pl.lit(None))
     errors = errors.with_columns(reference_trusted=pl.lit(True), **unknown)
@@ -216,10 +202,7 @@ def test_the_whole_log_s_bias_comes_off_for_everyone_if_asked_for():
     """Else the observers ask for it: `best` runs on what the whole log allows."""
     assert RefinementChoice.parsed() == RefinementChoice(bias=AUTOMATIC)
     words = {word: RefinementChoice.parsed(settings={"bias.method": word}) for word in REMOVALS}
-    assert {word: asked.corrects_all for word, asked in words.items()} == {
-        "auto": False,
-        "whole-log": True,
-        "none": False,
-    }
+    corrects = {word: asked.corrects_all for word, asked in words.items()}
+    assert corrects == {"auto": False, "whole-log": True, "none": False}
     with pytest.raises(ParameterError, match="there is auto, whole-log, none"):
         RefinementChoice(bias="all")

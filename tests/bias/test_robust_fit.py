@@ -116,10 +116,8 @@ def test_a_force_along_the_arm_is_felt_by_the_joints_before_it(name, joints):
         frames.append(model.addFrame(place))
     data, sd = model.createData(), np.repeat([50.0, 10.0, 50.0, 50.0], 3)
     for row, found in zip(q, loads.torque, strict=True):
-        J = [
-            pin.computeFrameJacobian(model, data, row, frame, pin.LOCAL_WORLD_ALIGNED)
-            for frame in frames
-        ]
+        axes = pin.LOCAL_WORLD_ALIGNED
+        J = [pin.computeFrameJacobian(model, data, row, frame, axes) for frame in frames]
         felt = np.vstack([J[0], J[1][:3], J[2][:3]]).T
         np.testing.assert_allclose(found, -sd * felt, atol=1e-12 * 50.0)
 

@@ -168,10 +168,8 @@ def test_a_short_log_loses_friction_alone():
     robot = shortened(ur10e(), 3)
     run = by_friction(robot, 6.0)
     found = whole_log_bias(run)
-    assert [r.code for r in found.remarks][:2] == [
-        "whole-log-friction-alone",
-        "whole-log-applied",
-    ]
+    codes = [r.code for r in found.remarks]
+    assert codes[:2] == ["whole-log-friction-alone", "whole-log-applied"]
     for unfitted in ("inertial", "rotor", "drive", "offset"):
         assert not getattr(found.error, unfitted).any()
     truth = 0.2 * usual_friction(robot)[0] * np.tanh(run.recording.dq / 0.003)

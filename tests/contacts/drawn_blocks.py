@@ -12,15 +12,9 @@ B = 0.024
 
 def blocks(d: Array, velocity: Array, known: Mask | None = None) -> Blocks:
     """Blocks of `B` seconds."""
-    count = len(d)
-    return Blocks(
-        t=B * (np.arange(count) + 0.5),
-        length=np.full(count, B),
-        d=d,
-        q=np.zeros_like(d),
-        velocity=velocity,
-        known=np.ones(count, dtype=bool) if known is None else known,
-    )
+    t = B * (np.arange(len(d)) + 0.5)
+    known = np.ones(len(d), dtype=bool) if known is None else known
+    return Blocks(t, np.full(len(d), B), d, np.zeros_like(d), velocity, known)
 
 
 def noise(joints: int = 1, *, seen: bool = True) -> TorqueNoise:

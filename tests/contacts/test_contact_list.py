@@ -52,10 +52,7 @@ def test_a_load_is_as_heavy_as_the_examination_says():
 
 def test_beside_a_joint_without_effort_every_row_is_a_candidate():
     """In the order of time, each with the reason; nothing is claimed, nor called untouched."""
-    late, early = (
-        contact(number=1, start=9.0, stop=9.5),
-        contact(number=1, start=2.0, evidence=30.0),
-    )
+    late, early = contact(start=9.0, stop=9.5), contact(start=2.0, evidence=30.0)
     found = replace(contact_list(late), candidates=(early,)).weighed(None, {"zero-effort"})
     assert not len(found)
     assert [(row.number, row.start) for row in found.candidates] == [(1, 2.0), (2, 9.0)]

@@ -83,11 +83,7 @@ def test_free_cycles_are_found_where_nothing_is_said():
 
 
 def part(recording: Recording, chosen: np.ndarray) -> Recording:
-    signals = {
-        name: getattr(recording, name)[chosen]
-        for name in ("q", "dq", "current")
-        if getattr(recording, name) is not None
-    }
+    signals = {name: recording.require(name)[chosen] for name in ("q", "dq", "current")}
     return Recording(t=recording.t[chosen] - recording.t[chosen][0], **signals)
 
 

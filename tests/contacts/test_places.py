@@ -20,9 +20,8 @@ def test_a_points_jacobian_is_how_it_moves(link):
     half = 0.5 * np.array(robot.chain.translation[link])
     frame = pin.Frame("point", link, pin.SE3(np.eye(3), half), pin.FrameType.OP_FRAME)
     number = model.addFrame(frame)
-    exact = pin.computeFrameJacobian(
-        model, model.createData(), Q, number, pin.LOCAL_WORLD_ALIGNED
-    )
+    data, axes = model.createData(), pin.LOCAL_WORLD_ALIGNED
+    exact = pin.computeFrameJacobian(model, data, Q, number, axes)
     found = link_jacobian(link_poses(robot.chain, Q[None]), link, 0.5)[0]
     np.testing.assert_allclose(found, exact, atol=1e-12)
 

@@ -65,10 +65,8 @@ def reached(name: str, seeds: tuple[int, ...] = SEEDS) -> Figures:
     onset = np.array([row.start - met.start for row, met in pairs])
     peak = np.array([row.peak_force - met.size for row, met in pairs])
     band = np.array([row.peak_band for row, _ in pairs])
-    impulse = [
-        np.linalg.norm(row.impulse - met.impulse) / np.linalg.norm(met.impulse)
-        for row, met in pairs
-    ]
+    norm = np.linalg.norm
+    impulse = [norm(row.impulse - met.impulse) / norm(met.impulse) for row, met in pairs]
     places = [row.where for row, _ in pairs]
     return {
         "true": len(pairs) + sum(len(each.missed) for each in scores),

@@ -49,10 +49,8 @@ def estimated(extra: Array | float = 0.0) -> ComparedSignals:
 def truth() -> tuple[ExternalTorque, Wrench]:
     torque, wrench = np.zeros((len(T), 6)), np.zeros((len(T), 6))
     torque[:, 1], wrench[:, 2] = 0.5 * steps(0.0), steps(0.0)
-    return (
-        ExternalTorque(name="file:truth", t=T, tau=torque),
-        Wrench(name="truth", t=T, values=wrench, frame="base"),
-    )
+    true = Wrench(name="truth", t=T, values=wrench, frame="base")
+    return ExternalTorque(name="file:truth", t=T, tau=torque), true
 
 
 def test_every_contact_is_detected_or_missed_with_its_delay_and_force():
@@ -111,11 +109,8 @@ def test_an_alarm_that_stays_on_detects_nothing_new():
     check = check_contacts(estimated(stays), limits(1e2, 1e3), *truth())
     assert check.detected == ()
     check = check_contacts(estimated(stays), limits(98.0, 1e3), *truth())
-    assert [(c.by, c.already_above) for c in check.contacts] == [
-        ("J1", False),
-        ("", True),
-        ("", True),
-    ]
+    found = [(c.by, c.already_above) for c in check.contacts]
+    assert found == [("J1", False), ("", True), ("", True)]
     assert np.isnan(check.largest_missed)
 
 

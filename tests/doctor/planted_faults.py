@@ -346,13 +346,6 @@ def table_from(recording: Recording, robot: str) -> Table:
     signal, effort = "current", recording.current
     if effort is None:
         signal, effort = "tau", recording.torque
-    return Table(
-        t=recording.t,
-        q=recording.q,
-        dq=recording.dq,
-        effort=effort,
-        signal=signal,
-        tau_ext=recording.tau_ext if signal == "tau" else None,
-        robot=robot,
-        given=robot,
-    )
+    vendor = recording.tau_ext if signal == "tau" else None
+    own = {"t": recording.t, "q": recording.q, "dq": recording.dq, "tau_ext": vendor}
+    return Table(**own, effort=effort, signal=signal, robot=robot, given=robot)

@@ -125,12 +125,8 @@ def panda_exciting(folder: Path) -> Recording:
     def numbers(name: str) -> Array:
         return np.loadtxt(folder / f"exciting_traj_{name}.txt").reshape(-1, 7)
 
-    return Recording(
-        t=np.loadtxt(folder / "exciting_traj_time.txt"),
-        q=numbers("positions"),
-        dq=numbers("velocity"),
-        torque=numbers("torques"),
-    )
+    q, dq, torque = (numbers(name) for name in ("positions", "velocity", "torques"))
+    return Recording(t=np.loadtxt(folder / "exciting_traj_time.txt"), q=q, dq=dq, torque=torque)
 
 
 def every(recording: Recording, step: int) -> Recording:

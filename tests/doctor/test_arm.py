@@ -199,11 +199,8 @@ def test_an_effort_with_columns_in_another_order_is_not_another_arm_s():
     assert made.robots[0].fits
 
 
-HELD = Recording(
-    t=0.01 * np.arange(1000),
-    q=np.tile(np.linspace(0.3, 1.2, 7), (1000, 1)),
-    dq=np.zeros((1000, 7)),
-)
+PLACE = np.tile(np.linspace(0.3, 1.2, 7), (1000, 1))
+HELD = Recording(t=0.01 * np.arange(1000), q=PLACE, dq=0.0 * PLACE)
 """A Panda in one pose: no load is fitted, so a share of its torque is the misfit to rounding."""
 HOLDING = gravity(PANDA, HELD)
 

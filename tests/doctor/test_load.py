@@ -59,12 +59,9 @@ def test_the_numbers_of_a_mismatch():
         (finding,) = mismatches(replace(still, payload_mass=payload))
         assert (finding.code, finding.level) == ("payload-mismatch", "warning")
         assert finding.where.joints == (2, 3)
-        assert dict(finding.values) == {
-            "carried_A": pytest.approx([2.0, -1.0]),
-            "expected_A": pytest.approx([1.0, 1.0]),
-            "extra_Nm": pytest.approx([10.0, -20.0]),
-            "payload_kg": payload,
-        }
+        numbers = {"carried_A": [2.0, -1.0], "expected_A": [1.0, 1.0], "extra_Nm": [10.0, -20.0]}
+        expected = {name: pytest.approx(values) for name, values in numbers.items()}
+        assert dict(finding.values) == expected | {"payload_kg": payload}
 
 
 @pytest.mark.parametrize(("samples", "reported"), [(19, False), (20, True)])

@@ -39,9 +39,7 @@ def circle() -> Circle:
 def repeated() -> Callable[..., Recording]:
     """A log of a periodic joint motion, as six harmonics would draw it."""
 
-    def make(
-        period=3.7, cycles=4.0, rate=100.0, approach=0.0, hold=0.0, start=0.0, push=0.0, seed=0
-    ):
+    def make(period=3.7, cycles=4, rate=100, approach=0, hold=0, start=0, push=0, seed=0):
         rng = np.random.default_rng(seed)
         t = np.arange(0.0, hold + approach + cycles * period + hold, 1.0 / rate)
         s = np.clip(t - hold - approach, 0.0, cycles * period) + start

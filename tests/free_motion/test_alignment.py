@@ -139,16 +139,14 @@ def test_a_shared_part():
     last = np.flatnonzero(abs(free.q - log.q).max(axis=1) > 0.05)[0] - 1
     # One sample, as the shift is known to 1 ms.
     np.testing.assert_allclose(shared[[0, -1]], [0, last], atol=1)
-    assert found.deviation == pytest.approx(
-        np.sqrt(np.mean((free.q - log.q)[: last + 1] ** 2)), rel=0.05
-    )
+    rms = np.sqrt(np.mean((free.q - log.q)[: last + 1] ** 2))
+    assert found.deviation == pytest.approx(rms, rel=0.05)
 
 
 def test_the_ur10e_pair_with_a_payload(logs):
     """Documented: after a shift of 1.18 s the positions agree to 0.10 mrad rms."""
-    loaded, free = (
-        read(logs / "ur10e" / f"{name}_14harm.csv", columns=UR10E) for name in ("load", "free")
-    )
+    folder = logs / "ur10e"
+    loaded, free = (read(folder / f"{k}_14harm.csv", columns=UR10E) for k in ("load", "free"))
     found = align(loaded, free)
     assert found.shift == pytest.approx(-1.18, abs=0.005)
     assert found.deviation == pytest.approx(0.10e-3, rel=0.1)

@@ -108,9 +108,8 @@ def test_coloured_noise_is_measured_where_it_is_quiet(memory, share):
     """Beside a slow load and short contacts. What is slower than a piece counts for nothing: of an
     exponential correlation a line over .4 s leaves 86 % of the variance at .03 s, 45 % at .1 s."""
     load = 10.0 * np.sin(2 * np.pi * 0.1 * TIMES)[:, None]
-    contact = np.where(
-        np.sin(2 * np.pi * 0.25 * TIMES) > 0.0, 30.0 * np.sin(2 * np.pi * TIMES) ** 2, 0.0
-    )
+    touched = np.sin(2 * np.pi * 0.25 * TIMES) > 0.0
+    contact = np.where(touched, 30.0 * np.sin(2 * np.pi * TIMES) ** 2, 0.0)
     x = coloured(memory, 4) + load + contact[:, None]
     left = float(np.sqrt(np.mean(low_pass(TIMES, coloured(memory, 4), 12.0) ** 2)))
     quiet = noise_when_quiet(TIMES, low_pass(TIMES, x, 12.0), MOVING, STEP, 12.0)[0]
@@ -173,9 +172,7 @@ def test_the_differences_are_those_of_the_mean_over_the_free_runs(drive_of):
         return drive_of(CLOCK, q, np.gradient(q, CLOCK, axis=0), **series)
 
     log, frees = run(), [run(), run()]
-    pairings = [
-        pair_with_run(CLOCK, free, shift) for free, shift in zip(frees, (0.0, 0.5), strict=True)
-    ]
+    pairings = [pair_with_run(CLOCK, free, 0.5 * k) for k, free in enumerate(frees)]
     pair = PairedRuns(motion=log, pairings=pairings)
     differences = {"drive_torque": (pair.torque, -1), "model_torque": (pair.model_difference, 1)}
     for name, (made, sign) in differences.items():

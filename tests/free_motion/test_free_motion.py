@@ -144,9 +144,8 @@ def test_shift_rate_and_covered_time_of_a_free_run(part_of, circle, rate):
     source, q = replace(part.source, t0=99.0), part.q + 0.01 * np.eye(6)[4]
     free = replace(part, t=rate * part.t + 2.0, q=q, source=source)
     choice = FreeChoice(logs=(Path("a"),))
-    _, (remark,) = partners_in_logs(
-        motion_of(Run(recording=log, robot=ROBOT), free, choice=choice)
-    )
+    motion = motion_of(Run(recording=log, robot=ROBOT), free, choice=choice)
+    _, (remark,) = partners_in_logs(motion)
     other = {} if rate < 1.0001 else {"rate": pytest.approx(rate, rel=1e-6)}
     assert remark.code == ("free-run-on-another-clock" if other else "free-run-aligned")
     # Two samples of 8 ms at the ends; the interpolation between samples adds some µrad squared.
@@ -211,9 +210,8 @@ def test_an_arm_carries_the_inertia_of_a_load_too(log):
 
 def test_its_wrench_is_what_its_torque_comes_from(log):
     """τ = Jᵀw; of 2.8 ± .1 kg each axis of the force is known to .1 kg of weight."""
-    load = FreeLoad(
-        mass=2.8, moment=PAYLOAD[1:], sd=0.1, moment_sd=np.array([0.01, 0.02, 0.03]), share=0.5
-    )
+    spread = np.array([0.01, 0.02, 0.03])
+    load = FreeLoad(mass=2.8, moment=PAYLOAD[1:], sd=0.1, moment_sd=spread, share=0.5)
     run, q = Run(recording=log, robot=ROBOT), log.q
     wrench, covariance = load.wrench(ROBOT.chain, q)
     J = flange_jacobian(ROBOT.chain, q)
@@ -228,9 +226,7 @@ def test_no_load_is_found_where_there_is_none(log):
     """In a simulation without noise or torque no joint has anything left over to divide by."""
     assert baseline(log).load is None
     assert free_load(()) is None
-    still = replace(
-        log, q=np.zeros_like(log.q), dq=np.zeros_like(log.q), current=0.0 * log.current
-    )
+    still = replace(log, q=0.0 * log.q, dq=0.0 * log.q, current=0.0 * log.current)
     weightless = replace(ROBOT, chain=replace(ROBOT.chain, gravity=np.zeros(3)))
     run = Run(recording=still, robot=weightless)
     assert free_load((RunSamples(run, log.t > 1.0),)) is None
@@ -244,9 +240,8 @@ def test_a_payload_is_torque_and_no_noise(log):
     rms, weight = {}, load_regressor(ROBOT.chain, log.q) @ PAYLOAD
     for name, found in (("plain", plain), ("loaded", loaded), ("blind", blind)):
         observer = tune_to_spectra("rts-auto", found.spectra)
-        reading = free_reading(
-            found, observer, observer.estimate(found.of(found.motion.log).terms)
-        )
+        terms = found.of(found.motion.log).terms
+        reading = free_reading(found, observer, observer.estimate(terms))
         rms[name] = rms_of_known(reading.samples)[moving]
         if found is loaded:
             # what the arm carries is in the estimate, free part and all

@@ -147,10 +147,8 @@ def shares_of_error(reference: ExternalTorque) -> tuple[np.ndarray, np.ndarray]:
     known = reference.known
     found = []
     for used in (reference.moving & known, known):
-        shown, expected = (
-            np.nanmean(np.where(used, x, np.nan) ** 2, axis=0)
-            for x in (reference.tau, reference.sd)
-        )
+        both = reference.tau, reference.sd
+        shown, expected = (np.nanmean(np.where(used, x, np.nan) ** 2, axis=0) for x in both)
         found.append(np.sqrt(shown / expected))
     np.testing.assert_allclose(expected, reference.floor**2, rtol=1e-9)  # the floor's own samples
     return found[0], found[1]
@@ -168,9 +166,8 @@ def test_a_payload_is_seen(logs):
     import pinocchio as pin
 
     robot = load_robot("ur10e")
-    loaded, free = (
-        read(logs / "ur10e" / f"{k}_14harm.csv", columns=UR10E) for k in ("load", "free")
-    )
+    folder = logs / "ur10e"
+    loaded, free = (read(folder / f"{k}_14harm.csv", columns=UR10E) for k in ("load", "free"))
     reference = two_cycle_difference(loaded, free, robot)
     model, data = robot.model, robot.model.createData()
     frame = model.getFrameId("flange")
@@ -194,9 +191,8 @@ def test_at_a_low_rate_the_low_pass_is_two_fifths_of_nyquist(circle, ur5):
     """Every fourth of 125 samples a second: .4 · 15.625 Hz."""
     log = circle.recording
     thin = Recording(t=log.t[::4], q=log.q[::4], dq=log.dq[::4], current=log.current[::4])
-    floors = [
-        r for r in two_cycle_difference(thin, (), ur5).remarks if r.code == "alignment-floor"
-    ]
+    remarks = two_cycle_difference(thin, (), ur5).remarks
+    floors = [r for r in remarks if r.code == "alignment-floor"]
     assert floors[1].values["rung"].endswith(" + 6.25 Hz low-pass")
 
 
@@ -212,10 +208,8 @@ def test_the_error_s_remarks_and_its_measured_ratio():
     origin, *others = floor_remarks(found, ratio, np.array([0.0, 0.4, 0.0, 0.0]))
     assert (origin.code, list(origin.values["ratio"])) == ("floor-measured", list(ratio))
     said = [(r.code, r.where.joints, *r.values.values()) for r in others]
-    assert said[:2] == [
-        ("joint-stands", (1,), 50 / 98, 3.0),
-        ("joint-stands-at-times", (2,), 49 / 98, 3.0),
-    ]
+    assert said[0] == ("joint-stands", (1,), 50 / 98, 3.0)
+    assert said[1] == ("joint-stands-at-times", (2,), 49 / 98, 3.0)
     assert [s[:2] for s in said[2:]] == [("friction-changed", (2,))]
     np.testing.assert_array_equal(said[2][2], [0.4])
 

@@ -21,18 +21,11 @@ def prepared_log(
     """A prepared log of exactly these signals; what is not given is zero."""
     shape = next(x for x in (q, dq, ddq, tau) if x is not None).shape
     q, dq, ddq, tau = (np.zeros(shape) if x is None else x for x in (q, dq, ddq, tau))
-    log = PreparedLog(
-        recording=Recording(t=t, q=q, dq=dq, torque=tau, **signals),
-        robot=UR5,
-        cutoff=CUTOFF,
-        kept=np.arange(len(t)),
-        t=t,
-        q=q,
-        dq=dq,
-        ddq=ddq,
-        tau=tau,
-        weights=np.ones(shape) if weights is None else weights,
-    )
+    own = {"t": t, "q": q, "dq": dq, "ddq": ddq, "tau": tau}
+    own["weights"] = np.ones(shape) if weights is None else weights
+    recording = Recording(t=t, q=q, dq=dq, torque=tau, **signals)
+    kept = np.arange(len(t))
+    log = PreparedLog(recording=recording, robot=UR5, cutoff=CUTOFF, kept=kept, **own)
     vars(log).update(load=np.zeros(shape) if load is None else load, warmth=warmth)
     return log
 

@@ -223,9 +223,7 @@ LITTLE, MISSING = IdentificationError, MissingSignalError
         (lambda: log(UR5.with_payload(HEAVY)), "friction", LITTLE, "kg on the flange .* payload"),
     ],
 )
-def test_a_log_that_tells_too_little_or_contradicts_its_arm_is_refused(
-    made, method, error, words
-):
+def test_a_log_that_tells_little_or_contradicts_its_arm_is_refused(made, method, error, words):
     with pytest.raises(error, match=words):
         identify([made()], UR5, Task(method=method))
 

@@ -34,16 +34,9 @@ def equations(prepared, truth, noise=0.05, load=5.0, reverses=True, limit=LIMIT)
 def rubbing(log, shape, values, noise=0.05, seed=0):
     """Equations of the one joint of a log whose torque is friction and noise."""
     y = log.friction(0, shape) @ np.array(values)
-    return JointData(
-        joint=0,
-        y=y + noise * np.random.default_rng(seed).standard_normal(log.samples),
-        fixed=np.zeros((log.samples, 0)),
-        weights=np.ones(log.samples),
-        logs=[log],
-        load_spread=0.0,
-        reverses=True,
-        speed_limit=LIMIT,
-    )
+    y = y + noise * np.random.default_rng(seed).standard_normal(log.samples)
+    own = {"y": y, "fixed": np.zeros((len(y), 0)), "weights": np.ones(len(y)), "logs": [log]}
+    return JointData(joint=0, **own, load_spread=0.0, reverses=True, speed_limit=LIMIT)
 
 
 @pytest.mark.parametrize(
@@ -92,9 +85,7 @@ def test_candidates_are_what_the_motion_can_tell(prepared):
         (3.0, True, 1000.0, ("offset",)),  # as much of a strong joint may be a model's error
     ],
 )
-def test_what_pushes_is_no_friction_nor_competes_with_any(
-    prepared, pushes, reverses, limit, terms
-):
+def test_what_pushes_is_no_friction(prepared, pushes, reverses, limit, terms):
     truth = {"coulomb": -pushes, "viscous": -pushes, "offset": 0.2 * reverses}
     noise = 0.05 if pushes else 0.0
     data = equations(prepared, truth, noise, reverses=reverses)._replace(torque_limit=limit)

@@ -168,12 +168,9 @@ def perturbed(chain, seed):
     """A chain with 20 % other masses and tensors and centres moved by a centimetre."""
     rng = np.random.default_rng(seed)
     scale = 1.0 + rng.uniform(-0.2, 0.2, chain.joints)
-    return replace(
-        chain,
-        mass=chain.mass * scale,
-        inertia=chain.inertia * scale[:, None, None],
-        com=chain.com + rng.uniform(-0.01, 0.01, chain.com.shape),
-    )
+    com = chain.com + rng.uniform(-0.01, 0.01, chain.com.shape)
+    inertia = chain.inertia * scale[:, None, None]
+    return replace(chain, mass=chain.mass * scale, inertia=inertia, com=com)
 
 
 @pytest.mark.parametrize(("name", "weight"), [("ur10e", 1.0), ("panda", links.WEIGHTS[0])])
@@ -229,9 +226,8 @@ def test_a_step_is_newton_s_and_its_decrement_what_the_cost_falls_and_bends_by()
     """Along s = −H⁻¹g slope and curvature are −gᵀH⁻¹g and gᵀH⁻¹g, by central differences."""
     chain, rng = load_robot("ur5").chain, np.random.default_rng(1)
     layout = ParameterColumns(chain, True, (Shape(()),) * 6)
-    start = np.concatenate(
-        [links.thicken_links(chain_parameters(chain)), np.linspace(0.5, 3.0, 6)]
-    )
+    thick = links.thicken_links(chain_parameters(chain))
+    start = np.concatenate([thick, np.linspace(0.5, 3.0, 6)])
     R = 3.0 * np.triu(rng.standard_normal((66, 66)))
     problem = links.Problem(R, R @ start, start, layout, 2.0)
     x = start * np.append(np.repeat(rng.uniform(0.8, 1.2, 6), 10), rng.uniform(0.5, 1.5, 6))

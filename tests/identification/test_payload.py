@@ -271,9 +271,8 @@ def test_the_mass_of_simulated_pairs_lies_within_its_deviation():
 def rests(chain, robot, load, rng):
     """Twelve poses of an arm whose links are `chain`'s and that carries a load, as a log."""
     true = rng.uniform(-0.7, 0.7, (12, 7)) + np.array([0, -0.4, 0, -2.0, 0, 1.6, 0.8])
-    flange = chain_parameters(robot.with_payload(load).loaded_chain) - chain_parameters(
-        robot.chain
-    )
+    own, loaded = robot.chain, robot.with_payload(load).loaded_chain
+    flange = chain_parameters(loaded) - chain_parameters(own)
     q = np.repeat(true, 120, axis=0)
     # a step between two rests, so that they are two
     q[::120] += 0.05

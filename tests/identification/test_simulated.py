@@ -21,15 +21,10 @@ from vftcli.simulation import prepare as build
 STICKS = "friction.presliding=0"
 """The numbers are required of joints that stick."""
 MISMATCH = [
-    STICKS,
-    "mismatch.mass=0.05",
-    "mismatch.com=0.01",
-    "mismatch.rotor_inertia=0.1",
-    "mismatch.friction=0.15",
-    "mismatch.torque_constant=0.02",
-    "friction.stribeck=0.15",
+    STICKS, "mismatch.mass=0.05", "mismatch.com=0.01", "mismatch.rotor_inertia=0.1",
+    "mismatch.friction=0.15", "mismatch.torque_constant=0.02", "friction.stribeck=0.15",
     "friction.stribeck_velocity=0.03",
-]
+]  # fmt: skip
 SEED = 1
 
 

@@ -57,12 +57,9 @@ def test_rotor_and_gravity_come_from_moments_beyond_the_rigid_body(targets):
 
 def test_friction_is_read_as_the_points_of_the_controllers_line(targets):
     dq = targets.dq
-    truth = JointFriction(
-        model="points",
-        parameters={"smoothing": 0.01, "load_coulomb": 0.05},
-        speeds=(0.01, 0.5, 1.5),
-        torques=(4.0, 7.0, 10.0),
-    )
+    parameters = {"smoothing": 0.01, "load_coulomb": 0.05}
+    line = {"speeds": (0.01, 0.5, 1.5), "torques": (4.0, 7.0, 10.0)}
+    truth = JointFriction(model="points", parameters=parameters, **line)
     law = friction_torque((truth,), dq, targets.gravity)
     bent = targets._replace(current=(targets.moment + targets.logs[0].filtered(law)) / K)
     shape, values, sd = controller_friction(0, bent, K)
@@ -96,9 +93,8 @@ def test_a_hand_that_leads_the_arm_is_refused(targets):
     with pytest.raises(IdentificationError, match="a hand led the arm"):
         refuse_guided(*guided_log(targets, 0.3))
     # a program asked for this share of the motion
-    below, above = (
-        np.arange(len(targets.dq)) < share * len(targets.dq) for share in (0.49, 0.51)
-    )
+    count = len(targets.dq)
+    below, above = (np.arange(count) < share * count for share in (0.49, 0.51))
     refuse_guided(*guided_log(targets, 1.0, asked=targets.dq * above[:, None]))
     with pytest.raises(IdentificationError, match="a hand led"):
         refuse_guided(*guided_log(targets, 1.0, asked=targets.dq * below[:, None]))

@@ -192,20 +192,16 @@ def test_the_profile_gives_the_papers_gains():
 
 
 def test_the_command_line_wins_over_the_profile():
-    (gmo, zoh), _ = build_observers(
-        ["gmo", "kfo-zoh"],
-        setup("ur5", "gmo.gain=30", "kfo.r_diag=1,2,3,4,5,6", "kfo-zoh.decay=2"),
-    )
+    asked = setup("ur5", "gmo.gain=30", "kfo.r_diag=1,2,3,4,5,6", "kfo-zoh.decay=2")
+    (gmo, zoh), _ = build_observers(["gmo", "kfo-zoh"], asked)
     np.testing.assert_array_equal(gmo.gain, [30.0] * 6)
     np.testing.assert_array_equal(zoh.r_diag, [1, 2, 3, 4, 5, 6])
     np.testing.assert_array_equal(zoh.decay, [2.0] * 6)
 
 
 def test_gains_nobody_gave_take_the_kalman_filters_delay_and_say_so():
-    (fdo, gmo, fe), remarks = build_observers(
-        ["fdo", "gmo", "kfo-fe"],
-        setup("panda", "kfo.noise_convention=density", joints=7, step=0.001),
-    )
+    asked = setup("panda", "kfo.noise_convention=density", joints=7, step=0.001)
+    (fdo, gmo, fe), remarks = build_observers(["fdo", "gmo", "kfo-fe"], asked)
     delay = fe.tuning(0.001, 7).delay
     np.testing.assert_allclose(gmo.tuning(0.001, 7).delay, delay, rtol=1e-12)
     np.testing.assert_allclose(1.0 / fdo.omega, np.mean(delay), rtol=1e-12)

@@ -36,11 +36,8 @@ def test_agrees_with_the_formula_written_as_a_loop(observer, jitter):
     r, k = np.zeros_like(terms.p), 7.0
     for i in range(1, terms.samples):
         a = 0.5 * k * (terms.t[i] - terms.t[i - 1])
-        r[i] = (
-            (1 - a) * r[i - 1]
-            + k * (terms.p[i] - terms.p[i - 1])
-            - a * (terms.mu[i] + terms.mu[i - 1])
-        ) / (1 + a)
+        gained = k * (terms.p[i] - terms.p[i - 1]) - a * (terms.mu[i] + terms.mu[i - 1])
+        r[i] = ((1 - a) * r[i - 1] + gained) / (1 + a)
     np.testing.assert_allclose(observer.estimate(terms).tau, r, atol=1e-11)  # rounding of ωp
 
 
@@ -75,11 +72,9 @@ def test_a_slow_clock_that_jitters_has_no_gaps(episode, samples):
     (gmo,), _ = build_observers(["gmo"], setup)
     estimate = gmo.estimate(terms)
     assert estimate.remarks == ()
-    truth = pl.read_parquet(samples / f"droid_raw_{episode}.truth.parquet")[
-        "tau_ext/6"
-    ].to_numpy()
+    true = pl.read_parquet(samples / f"droid_raw_{episode}.truth.parquet")["tau_ext/6"]
     # Every observer has .14 to .15 N·m there; with 78 restarts it was .30.
-    assert np.sqrt(np.mean((estimate.tau[:, 5] - truth) ** 2)) <= 0.17
+    assert np.sqrt(np.mean((estimate.tau[:, 5] - true.to_numpy()) ** 2)) <= 0.17
 
 
 def test_as_printed_fdo_leaks_momentum():
@@ -136,9 +131,8 @@ def test_blocks_of_a_log_give_the_whole_log_s_estimate(observer, jitter, as_prin
     np.testing.assert_array_equal(run_in_blocks(fdo, log, PIECE)[0], whole)
     for size in (1, 37, 5000):
         short = slice(0, 300 if size == 1 else None)
-        part = DynamicsTerms(
-            t=log.t[short], p=log.p[short], mu=log.mu[short], log_clock=log.clock
-        )
+        some = {name: getattr(log, name)[short] for name in ("t", "p", "mu")}
+        part = DynamicsTerms(**some, log_clock=log.clock)
         # the same sums in another order; momenta of 10 times ω
         found = run_in_blocks(fdo, part, size)[0]
         np.testing.assert_allclose(found, whole[short], rtol=0, atol=1e-11)

@@ -102,9 +102,7 @@ def test_as_printed_hold_goes_on_where_a_block_ends():
 
 def test_as_printed_hold_is_faster_than_the_corrected_one_by_a_quarter_of_a_sample():
     """Its unsymmetric part (Q_τ + Q_p)Ts²/2 pulls: 137.506 → 135.506 ms on J1, to first order."""
-    corrected, printed = (
-        paper("zoh", as_printed=as_printed).tuning(STEP, 6) for as_printed in (False, True)
-    )
+    corrected, printed = (paper("zoh", as_printed=x).tuning(STEP, 6) for x in (False, True))
     np.testing.assert_allclose(corrected.delay - printed.delay, STEP / 4, rtol=0.05)
     assert 1e3 * printed.delay[0] == pytest.approx(135.506, abs=0.001)
 
@@ -206,9 +204,7 @@ def steps(gaps: int = 0, seed: int = 4) -> np.ndarray:
     return dt
 
 
-def looped(
-    observer: KalmanObserver, dt: np.ndarray, prior: Covariance, before: Covariance
-) -> Gains:
+def looped(observer, dt: np.ndarray, prior: Covariance, before: Covariance) -> Gains:
     """The covariance recursion as it is written, Joseph's form: each sample a step from `before`.
 
     Rounding does not add up over the samples.

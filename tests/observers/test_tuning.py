@@ -39,10 +39,8 @@ def test_every_observer_reaches_the_stated_delay_or_bandwidth():
     for line in tuning.tune_all(spectra(), tuning.parse_goal("delay=0.05")):
         expected = 0.0 if line.observer == "kfo-rts" else 0.05
         np.testing.assert_allclose(line.delay, expected, atol=1e-9)
-    lines = {
-        line.observer: line
-        for line in tuning.tune_all(spectra(), tuning.parse_goal("bandwidth=3"))
-    }
+    every = tuning.tune_all(spectra(), tuning.parse_goal("bandwidth=3"))
+    lines = {line.observer: line for line in every}
     smoother = tuning.kalman_smoother(lines["kfo-rts"].rate)
     np.testing.assert_allclose(smoother.tuning(STEP, 2).bandwidth, 3.0, rtol=1e-12)
     # FDO and GMO are one filter where they share a rate
@@ -149,9 +147,7 @@ def low_passed_noise(samples: int, corner: float, seed: int) -> np.ndarray:
     return lfilter([1.0], [1.0, -2.0 * a, a * a], white, axis=0)
 
 
-def pushed(
-    samples: int = 8000, scale: float = 5.0, noise: float = 2.0
-) -> tuple[RunSamples, RunSamples]:
+def pushed(samples=8000, scale=5.0, noise=2.0) -> tuple[RunSamples, RunSamples]:
     """Half free, half with a random torque; white torque noise everywhere. Seed 1."""
     t = STEP * np.arange(samples)
     free = np.arange(samples) < samples // 2

@@ -175,13 +175,9 @@ def test_settling_is_no_contact():
 def reading(values: np.ndarray, zero: tuple[float, float] | None) -> SensorReading:
     wrench = Wrench(name="gmo", t=T, values=values, frame="base")
     free = (zero[0] <= T) & (zero[1] >= T) if zero else np.zeros(len(T), dtype=bool)
-    return SensorReading(
-        sensor=VirtualSensor(frame="base"),
-        wrenches=(wrench,),
-        masked=wrench.hidden,
-        drifts=(zero_drift(wrench, zero),) if zero else (),
-        free=free,
-    )
+    drifts = (zero_drift(wrench, zero),) if zero else ()
+    found = {"wrenches": (wrench,), "masked": wrench.hidden, "drifts": drifts, "free": free}
+    return SensorReading(sensor=VirtualSensor(frame="base"), **found)
 
 
 def test_contacts_are_reported_from_wrenches_where_there_are_some():

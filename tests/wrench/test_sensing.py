@@ -59,10 +59,8 @@ def test_neither_order_nor_company_nor_frame_moves_the_zero(frame):
     for names in orders:
         found = reading("ur5_sensor.parquet", *names, zero="start", frame=frame)
         assert found.zero_span == alone.zero_span
-        ours, theirs = (
-            [remark for remark in each.remarks if remark.code.startswith("log-wrench")]
-            for each in (found, alone)
-        )
+        both = found.remarks, alone.remarks
+        ours, theirs = ([r for r in some if r.code.startswith("log-wrench")] for some in both)
         assert ours == theirs != []
         np.testing.assert_array_equal(found.masked, alone.masked)
         (same,) = (w for w in found.wrenches if w.name == "gmo")
@@ -223,10 +221,8 @@ def test_a_load_of_the_free_part_is_in_the_wrench_and_no_noise(motion):
     plain = FreeLog(without_load(run, load), as_modelled(motion).free)
     loaded = FreeLog(run, plain.free, load)
     gate = Gate([(4.5, 5.0)], WrenchPrior(1.0, 30.0))
-    bare, found = (
-        smooth_all(["best"], log, {}, unloaded=nothing, gate=gate)["best"]
-        for log in (plain, loaded)
-    )
+    how = {"unloaded": nothing, "gate": gate}
+    bare, found = (smooth_all(["best"], log, {}, **how)["best"] for log in (plain, loaded))
     assert found.load is load
     assert "wrench-holds-load" in {remark.code for remark in found.remarks("best")}
     q = resample_columns(found.t, run.recording.t, run.recording.q)
@@ -272,10 +268,8 @@ def test_a_measured_band_is_taken_as_it_is():
 
 def log_run(dq: np.ndarray) -> Run:
     """A UR5 log whose joints move as given."""
-    recording = Recording(
-        t=T, q=np.cumsum(dq, axis=0) * 0.01, dq=dq, current=np.zeros((len(T), 6))
-    )
-    return Run(recording=recording, robot=load_robot("ur5"))
+    log = Recording(t=T, q=np.cumsum(dq, axis=0) * 0.01, dq=dq, current=np.zeros((len(T), 6)))
+    return Run(recording=log, robot=load_robot("ur5"))
 
 
 @pytest.mark.parametrize("moves", [True, False])

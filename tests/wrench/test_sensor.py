@@ -119,13 +119,8 @@ def reading(*removed: bool) -> SensorReading:
     """One observer, 80 ms late; a drift of its unloaded span for each flag."""
     wrench = Wrench(name="gmo", t=TIMES, values=force(0.08), frame="base", masked=TIMES > 19.0)
     drifts = tuple(zero_drift(wrench, SPAN)._replace(removed=flag) for flag in removed)
-    return SensorReading(
-        sensor=VirtualSensor(frame="base"),
-        wrenches=(wrench,),
-        masked=wrench.hidden,
-        drifts=drifts,
-        free=TIMES < 4.0,
-    )
+    found = {"wrenches": (wrench,), "masked": wrench.hidden, "drifts": drifts}
+    return SensorReading(sensor=VirtualSensor(frame="base"), free=TIMES < 4.0, **found)
 
 
 def test_a_sensors_own_zero_goes_where_the_readings_went():
@@ -174,9 +169,8 @@ def test_which_solver_made_which_wrench():
 
 def wrench(null_space: np.ndarray | None) -> Wrench:
     t = np.arange(1000.0)
-    return Wrench(
-        name="gmo", t=t, values=np.zeros((1000, 6)), frame="base", null_space=null_space
-    )
+    nothing = np.zeros((1000, 6))
+    return Wrench(name="gmo", t=t, values=nothing, frame="base", null_space=null_space)
 
 
 FREE = np.arange(1000) < 500

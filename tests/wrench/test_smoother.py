@@ -55,11 +55,9 @@ def simulated(robot: Robot, q: Array, wrench: Array, t: Array, seed: int = 1) ->
 
 def swing(robot: Robot, t: Array) -> Array:
     """A motion of all joints about a regular pose. (T, n) [rad]"""
-    middle = (
-        [0.3, -1.2, 1.5, -1.0, 1.2, 0.4] if robot.joints == 6 else [0, 0.3, 0, -1.8, 0, 2, 0.7]
-    )
+    six, seven = [0.3, -1.2, 1.5, -1.0, 1.2, 0.4], [0, 0.3, 0, -1.8, 0, 2, 0.7]
     phases = np.arange(robot.joints)
-    return np.array(middle) + 0.3 * np.sin(0.9 * t[:, None] + phases)
+    return np.array(six if robot.joints == 6 else seven) + 0.3 * np.sin(0.9 * t[:, None] + phases)
 
 
 def load(t: Array) -> Array:
@@ -286,9 +284,7 @@ def test_the_band_where_nothing_is_listed_is_one_around_a_rest_too(near):
 COUNT, SECONDS = 30, 0.1
 T = SECONDS * (np.arange(COUNT) + 0.5)
 NOTHING = np.zeros((COUNT, 6))
-BLOCKS = Blocks(
-    T, np.full(COUNT, SECONDS), NOTHING, NOTHING, np.ones((COUNT, 6)), np.ones(COUNT, dtype=bool)
-)
+BLOCKS = Blocks(T, np.full(COUNT, SECONDS), NOTHING, NOTHING, NOTHING + 1.0, T > 0.0)
 NOISE = noise(6)._replace(variance=np.full(6, 4.0), time=np.full(6, 0.5))
 PRIOR = WrenchPrior(2.0, 30.0)
 

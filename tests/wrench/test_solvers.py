@@ -31,13 +31,9 @@ REGULAR = np.array([0.3, -1.2, 1.4, -1.7, -1.5, 0.2])
 
 def torque_of(robot: str, q: np.ndarray, wrench: np.ndarray) -> np.ndarray:
     """τ = Jᵀw by Pinocchio, for a wrench in base axes about the flange."""
-    model = load_robot(robot).model
-    data = model.createData()
-    frame = model.getFrameId("flange")
-    J = [
-        pin.computeFrameJacobian(model, data, row, frame, pin.LOCAL_WORLD_ALIGNED).copy()
-        for row in q
-    ]
+    model, axes = load_robot(robot).model, pin.LOCAL_WORLD_ALIGNED
+    data, frame = model.createData(), model.getFrameId("flange")
+    J = [pin.computeFrameJacobian(model, data, row, frame, axes).copy() for row in q]
     return np.einsum("tij,ti->tj", np.array(J), np.broadcast_to(wrench, (len(q), 6)))
 
 
