@@ -85,9 +85,8 @@ def pushed(torque, duration=0.4, zero=(0.05, 0.1)) -> ClosedLoop:
     scenario = replace(load_scenario("ur5-drag", ()), contacts=(push,), duration=duration)
     robot = load_robot("ur5")
     p = from_table(robot.admittance, robot.name, parse_settings(["threshold_mode=soft"]))
-    return run_closed_loop(
-        scenario, variable(p), observer("ur5", "discrete"), seed=1, torque=torque, zero=zero
-    )
+    kalman = observer("ur5", "discrete")
+    return run_closed_loop(scenario, variable(p), kalman, seed=1, torque=torque, zero=zero)
 
 
 @pytest.fixture(scope="module")

@@ -118,9 +118,8 @@ def test_printed_v_rises_and_w_does_not(limit):
 
 def test_printed_v_of_the_paper_s_release():
     """0.684 → 1.099 J from 0.3 m at α = 1.9 as Ts → 0 (science of the issue)."""
-    controller = law.variable(
-        replace(UR5, alpha=np.full(6, 1.9), period=1e-4, speed_limit=np.inf)
-    )
+    p = replace(UR5, alpha=np.full(6, 1.9), period=1e-4, speed_limit=np.inf)
+    controller = law.variable(p)
     motion = release([controller], start(0.3), 2.0)
     V = law.printed_energy(controller, motion.x[:, 0], motion.v[:, 0])[:, 0]
     assert V[0] == pytest.approx(0.684, abs=5e-4)  # printed digits
@@ -202,9 +201,8 @@ def escapes(xi: float, y: float) -> bool:
 
     gone.terminal = turned.terminal = True
     turned.direction = -1.0
-    found = solve_ivp(
-        slope, [0.0, 1e4], [0.0, y], events=[gone, turned], rtol=1e-9, atol=1e-12, method="Radau"
-    )
+    how = {"events": [gone, turned], "rtol": 1e-9, "atol": 1e-12, "method": "Radau"}
+    found = solve_ivp(slope, [0.0, 1e4], [0.0, y], **how)
     return len(found.t_events[0]) > 0
 
 
@@ -278,9 +276,8 @@ def test_table_iii_and_iv():
 
 
 def test_assignments_reach_their_axes():
-    p = of_profile(
-        "ur5", "position.stiffness=9", "z.threshold=15", "xi=1", "rotation.mass=0.1,0.2,0.3"
-    )
+    mass = "rotation.mass=0.1,0.2,0.3"
+    p = of_profile("ur5", "position.stiffness=9", "z.threshold=15", "xi=1", mass)
     np.testing.assert_array_equal(p.stiffness, [9, 9, 9, 0.5, 0.5, 0.5])
     np.testing.assert_array_equal(p.threshold, [20, 20, 15, 6, 6, 6])
     np.testing.assert_array_equal(p.mass, [3, 3, 3, 0.1, 0.2, 0.3])

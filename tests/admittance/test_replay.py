@@ -171,9 +171,7 @@ def test_a_start_outside_the_limits_and_no_deviation_are_refused():
         run((record, q))
     p = parameters()
     with pytest.raises(ParameterError, match=r"the start pose has 5 joints; ur5 has 6"):
-        replay.replay_release(
-            np.array([0.3, 0, 0, 0, 0, 0]), UR5, controllers(p), start=np.zeros(5)
-        )
+        replay.replay_release(0.3 * np.eye(6)[0], UR5, controllers(p), start=np.zeros(5))
     with pytest.raises(ParameterError, match=r"--release x=0\.3"):
         replay.replay_release(np.zeros(6), UR5, controllers(p), start=START)
 
@@ -262,9 +260,8 @@ def replayed(made=None, way=None, *, parameters=PARAMETERS, **others) -> replay.
     """A replay without trouble, but for what is given."""
     zero = np.zeros((ROWS - 1, 6))
     given = {"start": zero[0], "wrench": zero, "drags": (), **others}
-    found = replay.Replay(
-        robot=UR5, controllers=controllers(parameters), motion=made or motion_of(), **given
-    )
+    given |= {"controllers": controllers(parameters), "motion": made or motion_of()}
+    found = replay.Replay(robot=UR5, **given)
     vars(found).update(path=way or path_of())
     return found
 

@@ -88,9 +88,8 @@ def test_another_run_of_the_arm_loses_the_same_error(found):
     before, after = (rms(raw_disturbance(x.terms)) for x in (other, found.of(other)))
     # unseen motion, not a fold of the same one
     assert np.mean(after[found.applied]) < 0.7 * np.mean(before[found.applied])
-    np.testing.assert_array_equal(
-        found.of(other).terms.mu[:, ~found.applied], other.terms.mu[:, ~found.applied]
-    )
+    left, own = (x.terms.mu[:, ~found.applied] for x in (found.of(other), other))
+    np.testing.assert_array_equal(left, own)
 
 
 def test_remarks_say_what_became_of_each_joint(found):

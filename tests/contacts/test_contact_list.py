@@ -127,10 +127,8 @@ def test_a_size_is_a_range_where_the_place_is_unknown_and_torques_where_no_force
 )
 def test_a_load_is_the_payload_that_weighs_as_much(mass, sd, name):
     """2.8 kg or 1.1 kg, within a tenth of the load or two of its standard deviations."""
-    payloads = {
-        key: Payload(mass=m, com=np.zeros(3), inertia=np.zeros((3, 3)))
-        for key, m in (("gripper", 2.8), ("camera", 1.1))
-    }
+    body = {"com": np.zeros(3), "inertia": np.zeros((3, 3))}
+    payloads = {"gripper": Payload(mass=2.8, **body), "camera": Payload(mass=1.1, **body)}
     robot, t = replace(load_robot("ur5"), payloads=payloads), 0.1 * np.arange(100)
     dq = np.where((t > 2.0) & (t < 7.0), 0.3, 0.0)[:, None] * np.ones(6)
     run = Run(recording=Recording(t=t, q=0.0 * dq, dq=dq), robot=robot)

@@ -34,9 +34,8 @@ def part(signals: ComparedSignals, start: float, stop: float) -> ComparedSignals
     inside = (signals.t >= start) & (signals.t < stop)
     whole = signals.recording
     taken = Recording(t=whole.t[inside], q=whole.q[inside], source=whole.source)
-    return replace(
-        signals, recording=taken, torque=signals.torque[inside], wrench=signals.wrench[inside]
-    )
+    torque, wrench = signals.torque[inside], signals.wrench[inside]
+    return replace(signals, recording=taken, torque=torque, wrench=wrench)
 
 
 def counts(path: Path, robot: str) -> dict[float, CountedAlarms]:

@@ -266,10 +266,8 @@ class Fault(NamedTuple):
 
     def is_named_by(self, finding: Remark) -> bool:
         """Whether a finding has a code of the fault and is about its joints, or about none."""
-        about = set(finding.where.joints)
-        return finding.code in self.codes and (
-            not about or not self.joints or about == set(self.joints)
-        )
+        about, own = set(finding.where.joints), set(self.joints)
+        return finding.code in self.codes and (not about or not own or about == own)
 
 
 FAULTS: Mapping[str, Fault] = {

@@ -103,9 +103,8 @@ def brakes(table: Table, seconds: float) -> Table:
 
 def gravity_only(table: Table, seconds: float) -> Table:
     """Effort that is the model's gravity for so long, as in freedrive or of a target."""
-    span = (table.t >= table.t[first_bad(table)]) & (
-        table.t < table.t[first_bad(table)] + seconds
-    ) | np.isinf(seconds)
+    later = table.t - table.t[first_bad(table)]
+    span = (later >= 0.0) & (later < seconds) | np.isinf(seconds)
     gravity = plant.gravity_torque(table, table.arm) / table.constant
     return replace(table, effort=np.where(span[:, None], gravity, table.effort))
 

@@ -215,12 +215,10 @@ def match_of(**signals: Array | None) -> RobotMatch:
 def test_a_profile_fits_up_to_the_limit_of_its_evidence(evidence, limit):
     for misfit, fits in ((limit - 0.01, True), (limit + 0.01, False)):
         torque = HOLDING / (1 - misfit)
-        signals = {
-            MAKER: {"torque": HOLDING, "target_torque": torque},
-            RESIDUAL: {"torque": torque - 1, "tau_ext": 1 + 0 * torque},
-            MEASURED: {"torque": torque},
-        }[evidence]
-        found = match_of(**signals)
+        maker = {"torque": HOLDING, "target_torque": torque}
+        vendor = {"torque": torque - 1, "tau_ext": 1 + 0 * torque}
+        signals = {MAKER: maker, RESIDUAL: vendor, MEASURED: {"torque": torque}}
+        found = match_of(**signals[evidence])
         assert (found.evidence, found.fits, found.load) == (evidence, fits, 0.0)
         assert found.by_maker == (evidence != MEASURED)
         assert found.misfit == pytest.approx(misfit, abs=1e-9)

@@ -135,9 +135,8 @@ def test_brakes_are_cut_out_with_the_half_second_beside():
     log = Recording(t=t, q=q, dq=dq, current=current)
     assert Examiner().read_as(log, ROBOT, ReadChoice()).samples == log.samples
     off = (t >= 33) & (t < 38)
-    sound = Examiner().read_as(
-        replace(log, current=np.where(off[:, None], noise, current)), ROBOT, ReadChoice()
-    )
+    idle = replace(log, current=np.where(off[:, None], noise, current))
+    sound = Examiner().read_as(idle, ROBOT, ReadChoice())
     (cut,) = sound.source.cuts
     assert (cut.code, cut.start <= 33, cut.stop >= 38 - 0.008) == ("brakes", True, True)
     assert cut.stop - cut.start < 5 + 4 * 0.5

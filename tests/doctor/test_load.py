@@ -206,13 +206,9 @@ def far(code: str, temperature: float, level: str = "warning") -> Said:
 
 
 # s(25)/s(35) worked by hand: size 3 2.9177/2.5366, size 1 .64593/.52003
-NONE = only(
-    "no-temperature",
-    level="fact",
-    reference_C=[35.0],
-    least_percent=pytest.approx(15.02, abs=0.01),
-    most_percent=pytest.approx(24.21, abs=0.01),
-)
+SHARES = {"least_percent": 15.02, "most_percent": 24.21}
+ROUNDED = {name: pytest.approx(percent, abs=0.01) for name, percent in SHARES.items()}
+NONE = only("no-temperature", level="fact", reference_C=[35.0], **ROUNDED)
 
 
 @pytest.mark.parametrize(

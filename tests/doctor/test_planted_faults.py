@@ -24,10 +24,7 @@ EFFORT = {"ur10e": "current", "ur5": "current", "panda": "tau"}
 SCENARIOS = {"ur5": ("ur5-circle", 16.0), "panda": ("panda-bearing", 14.0)}
 """Simulated log → its scenario and how much of it is run. [s]"""
 PAIRS = [
-    (log, name)
-    for log, effort in EFFORT.items()
-    for name, fault in FAULTS.items()
-    if fault.signal in {"", effort}
+    (log, name) for log in EFFORT for name in FAULTS if FAULTS[name].signal in {"", EFFORT[log]}
 ]
 
 SILENT: Mapping[tuple[str, str], str] = {

@@ -247,11 +247,8 @@ def test_pushes_are_not_taken_for_it(swing, seed):
 
 STICKS = "friction.presliding=0"
 """The joints that the figures are required of."""
-SETTINGS = {
-    "stiff": ["servo.stiffness=stiff"],
-    "soft": ["servo.stiffness=soft"],
-    "drift": ["sensing.clock_drift=0.003"],
-}
+SETTINGS = {name: [f"servo.stiffness={name}"] for name in ("stiff", "soft")}
+SETTINGS["drift"] = ["sensing.clock_drift=0.003"]
 
 OVERSTATED = pytest.mark.xfail(
     strict=True, reason="the floor of joint 4 is stated too large there: it errs by .65 of it"

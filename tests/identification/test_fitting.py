@@ -271,9 +271,8 @@ def test_the_controllers_own_model_is_read_off():
     assert known["determined"].to_list()[1:3] == [True, True]
     np.testing.assert_allclose(found.robot.chain.rotor_inertia, chain.rotor_inertia, rtol=0.02)
     v = np.linspace(0.2, 0.8, 4)[:, None] * np.ones(6)
-    np.testing.assert_allclose(
-        friction_torque(found.robot.friction, v), friction_torque(true.friction, v), rtol=0.1
-    )
+    read, planted = (friction_torque(x.friction, v) for x in (found.robot, true))
+    np.testing.assert_allclose(read, planted, rtol=0.1)
 
 
 def two_folders(*logs):

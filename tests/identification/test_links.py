@@ -13,9 +13,8 @@ from vftcli.robots import load_robot
 from vftcli.robots.kernels import TENSOR, chain_parameters, torque_regressor, with_parameters
 
 CHAIN = load_robot("ur5").chain
-LAYOUT = ParameterColumns(
-    CHAIN, True, (Shape(("coulomb", "viscous")), *(Shape(("viscous",)),) * 5)
-)
+SHAPES = Shape(("coulomb", "viscous")), *(Shape(("viscous",)),) * 5
+LAYOUT = ParameterColumns(CHAIN, True, SHAPES)
 
 
 @pytest.fixture
@@ -39,10 +38,8 @@ def test_rows_are_the_equation_of_motion(log):
     rows = LAYOUT.rows(log, slice(100, 140))
     rigid = torque_regressor(CHAIN, log.q, log.dq, log.ddq)[100:140] @ x[:60]
     rotors = log.ddq[100:140] * (1.0 + np.arange(6))
-    friction = [
-        log.friction(j, shape)[100:140] @ x[place]
-        for j, (shape, place) in enumerate(zip(LAYOUT.shapes, LAYOUT.frictions, strict=True))
-    ]
+    parts = enumerate(LAYOUT.frictions)
+    friction = [log.friction(j, SHAPES[j])[100:140] @ x[place] for j, place in parts]
     np.testing.assert_allclose(rows @ x, rigid + rotors + np.transpose(friction), atol=1e-10)
     assert len(LAYOUT.names) == LAYOUT.size == 73
     assert LAYOUT.names[65:69] == ("J6", "coulomb1", "viscous1", "viscous2")

@@ -234,9 +234,8 @@ def test_what_a_log_would_tune_and_first_order_gains_keep_to_densities():
     panda = setup("panda", joints=7, step=0.001)
     names = ["best", "kfo-auto", "rts-auto", "fdo", "gmo"]
     (best, auto, smoother, fdo, gmo), _ = build_observers(names, panda)
-    (density,), _ = build_observers(
-        ["kfo-zoh"], setup("panda", "kfo.noise_convention=density", joints=7, step=0.001)
-    )
+    stated = setup("panda", "kfo.noise_convention=density", joints=7, step=0.001)
+    (density,), _ = build_observers(["kfo-zoh"], stated)
     wanted = density.tuning(0.001, 7)
     for observer in (best, auto, smoother):
         np.testing.assert_array_equal(observer.tuning(0.001, 7).omega_n, wanted.omega_n)

@@ -214,11 +214,9 @@ def looped(observer, dt: np.ndarray, prior: Covariance, before: Covariance) -> G
     for k in range(1, len(dt)):
         p11, p12, p22 = (p[k - 1] for p in before)
         moved = p12 + model.a12[k] * p22
-        prior = Covariance(
-            p11 + model.a12[k] * (p12 + moved) + model.q11[k],
-            model.a22[k] * moved + model.q12[k],
-            model.a22[k] ** 2 * p22 + model.q22[k],
-        )
+        p11 = p11 + model.a12[k] * (p12 + moved) + model.q11[k]
+        p12, p22 = model.a22[k] * moved + model.q12[k], model.a22[k] ** 2 * p22 + model.q22[k]
+        prior = Covariance(p11, p12, p22)
         found.append(joseph(prior, model.r[k]))
     return Gains(*np.moveaxis(np.array(found), 1, 0))
 

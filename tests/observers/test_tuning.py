@@ -342,8 +342,7 @@ def test_first_order_observers_are_called_alike_only_where_both_run():
     _, (remark,) = tuning.match_observers(observers, tuning.parse_goal("bandwidth=3"), 0.008, 3)
     assert (remark.code, remark.values) == ("bandwidth-matched", {"bandwidth_Hz": 3.0})
     observers, _ = build_observers(PAPER, setup())
-    _, (matched, alike) = tuning.match_observers(
-        observers, tuning.parse_goal("delay=0.05"), 0.008, 3
-    )
+    goal = tuning.parse_goal("delay=0.05")
+    _, (matched, alike) = tuning.match_observers(observers, goal, 0.008, 3)
     assert (matched.code, matched.values) == ("delay-matched", {"delay_s": 0.05})
     assert alike.code == "first-order-observers-alike"

@@ -162,9 +162,8 @@ def pushed(point: str, force: float = 25.0, seed: int = 3) -> Recording:
     """20 s of motion with five pushes, planted; the controller gives their moment about a point."""
     rng = np.random.default_rng(seed)
     t = np.arange(0.0, 20.0, 0.008)
-    q = np.array([0.3, -1.2, 1.4, -1.7, -1.5, 0.2]) + 0.4 * np.sin(
-        t[:, None] * rng.uniform(0.3, 1.0, 6) + rng.uniform(0.0, 6.0, 6)
-    )
+    angle = t[:, None] * rng.uniform(0.3, 1.0, 6) + rng.uniform(0.0, 6.0, 6)
+    q = np.array([0.3, -1.2, 1.4, -1.7, -1.5, 0.2]) + 0.4 * np.sin(angle)
     about_flange = np.zeros((len(t), 6))
     for start in (2.0, 5.0, 9.0, 13.0, 17.0):
         inside = (t >= start) & (t < start + 1.5)

@@ -84,12 +84,9 @@ def free_run(moving: np.ndarray, seconds: float = 60.0) -> RunSamples:
 
 def blocks_at(velocity: np.ndarray) -> Blocks:
     """Blocks of .1 s in which the joints are as fast as given. (K, 6)"""
-    count = len(velocity)
-    nothing = np.zeros((count, 6))
-    t = SECONDS * (np.arange(count) + 0.5)
-    return Blocks(
-        t, np.full(count, SECONDS), nothing, nothing, velocity, np.ones(count, dtype=bool)
-    )
+    nothing = np.zeros_like(velocity)
+    t = SECONDS * (np.arange(len(velocity)) + 0.5)
+    return Blocks(t, np.full_like(t, SECONDS), nothing, nothing, velocity, t > 0.0)
 
 
 LOG = blocks_at(np.ones((50, 6)))

@@ -214,9 +214,8 @@ def test_a_list_of_contacts_is_its_gate(motion):
 
 def test_a_load_of_the_free_part_is_in_the_wrench_and_no_noise(motion):
     """2 kg at 5 cm off the flange, in every sample: 19.6 N outside of the contacts too."""
-    load = FreeLoad(
-        mass=2.0, moment=np.array([0.0, 0.0, 0.1]), sd=0.1, moment_sd=np.full(3, 0.01), share=0.5
-    )
+    moment, spread = np.array([0.0, 0.0, 0.1]), np.full(3, 0.01)
+    load = FreeLoad(mass=2.0, moment=moment, sd=0.1, moment_sd=spread, share=0.5)
     run, nothing = motion.log, np.zeros(motion.log.recording.samples, dtype=bool)
     plain = FreeLog(without_load(run, load), as_modelled(motion).free)
     loaded = FreeLog(run, plain.free, load)

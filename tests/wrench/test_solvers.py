@@ -40,10 +40,8 @@ def torque_of(robot: str, q: np.ndarray, wrench: np.ndarray) -> np.ndarray:
 def reported(robot: str, q: np.ndarray, tau: np.ndarray, **how):
     torque = ExternalTorque(name="x", t=np.arange(len(q)) * 0.01, tau=tau)
     known = {"x": how.pop("sd")} if "sd" in how else {}
-    (found,) = VirtualSensor(frame="base", **how).wrenches(
-        (torque,), q, load_robot(robot).chain, known
-    )
-    return found
+    sensor, chain = VirtualSensor(frame="base", **how), load_robot(robot).chain
+    return sensor.wrenches((torque,), q, chain, known)[0]
 
 
 def poses(robot: str, samples: int = 60, seed: int = 2) -> np.ndarray:
@@ -82,9 +80,8 @@ def test_the_answer_and_its_covariance_are_those_of_the_textbook(solver):
     J = flange_jacobian(load_robot("ur5").chain, q)[0]
     prior = np.diag((PRIOR * SCALE) ** -2.0)
     information = J @ np.diag(sd**-2) @ J.T + prior
-    gain = {"pinv": np.linalg.pinv(J.T), "map": np.linalg.inv(information) @ J @ np.diag(sd**-2)}[
-        solver
-    ]
+    weighed = np.linalg.inv(information) @ J @ np.diag(sd**-2)
+    gain = {"pinv": np.linalg.pinv(J.T), "map": weighed}[solver]
     covariance = gain @ np.diag(sd**2) @ gain.T
     if solver == "map":
         covariance = np.linalg.inv(information)
