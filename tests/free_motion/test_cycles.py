@@ -117,25 +117,31 @@ def test_impossible_periods(repeated, stated, message):
         find_period(repeated(), stated)
 
 
-def test_no_repetition(repeated):
-    """Six joints wander off by 20 mrad/s: √6 · 20 mrad/s · 3.7 s = .18 rad a period."""
-    wandering = replace(log := repeated(), q=log.q + 0.02 * log.t[:, None])
-    with pytest.raises(ReferenceTorqueError, match=r"after 3\.[67]\d* s, .* 0\.18 rad.*--free"):
-        find_period(wandering)
+def resized(log, size):
+    """Positions of which the joint that moves most moves by so much. [rad]"""
+    return {"q": size / np.ptp(log.q, axis=0).max() * log.q}
 
 
-def test_an_arm_at_rest(repeated):
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        # Six joints wander off by 20 mrad/s: √6 · 20 mrad/s · 3.7 s = .18 rad a period.
+        (
+            lambda log: {"q": log.q + 0.02 * log.t[:, None]},
+            r"after 3\.[67]\d* s, .* 0\.18 rad.*--free",
+        ),
+        # A jump of the clock by 10⁶ s: an even series over it would hold 10⁸ samples.
+        (lambda log: {"t": log.t + 1e6 * (log.t > 7.4)}, r"is a gap, .* leave the gap out"),
+        (lambda log: {"q": 0.0 * log.q, "dq": 0.0 * log.q}, "does not move"),
+        (lambda log: resized(log, 0.0099), "does not move"),  # 1 cm at an arm's length of a metre
+        (lambda log: {k: getattr(log, k)[:7] for k in ("t", "q", "dq")}, "7 samples are too few"),
+    ],
+)
+def test_a_log_without_a_period_is_refused(repeated, changes, said):
     log = repeated()
-    still = replace(log, q=np.tile(log.q[:1], (log.samples, 1)), dq=np.zeros(log.q.shape))
-    with pytest.raises(ReferenceTorqueError, match="does not move"):
-        find_period(still)
-    size = np.ptp(log.q, axis=0).max()
-    with pytest.raises(ReferenceTorqueError, match="does not move"):
-        moving_part(replace(log, q=0.0099 / size * log.q))
-    moving_part(replace(log, q=0.0101 / size * log.q))  # 1 cm at an arm's length of a metre
-    few = replace(log, **{name: getattr(log, name)[:7] for name in ("t", "q", "dq")})
-    with pytest.raises(ReferenceTorqueError, match="7 samples are too few"):
-        moving_part(few)
+    with pytest.raises(ReferenceTorqueError, match=said):
+        find_period(replace(log, **changes(log)))
+    moving_part(replace(log, **resized(log, 0.0101)))
 
 
 def test_sweeps_of_a_real_arm_are_no_repetition(logs):
@@ -168,14 +174,6 @@ def test_positions_alone_tell_where_the_arm_rests(repeated):
     # A joint counts as standing from 0.1 s before its rest to 0.1 s after it.
     assert (t[0], t[-1]) == (pytest.approx(1.1, abs=0.03), pytest.approx(15.7, abs=0.03))
     np.testing.assert_array_equal(q, moving_part(log)[1])
-
-
-def test_a_log_that_is_nearly_all_gap_is_refused(repeated):
-    """A jump of the clock by 10⁶ s: an even series over it would hold 10⁸ samples."""
-    log = repeated()
-    late = np.arange(log.samples) > log.samples // 2
-    with pytest.raises(ReferenceTorqueError, match=r"is a gap, .* leave the gap out"):
-        find_period(replace(log, t=log.t + 1e6 * late))
 
 
 T = 0.01 * np.arange(1200)

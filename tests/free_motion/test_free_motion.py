@@ -296,7 +296,7 @@ def test_what_counts_as_given():
     assert not FreeChoice().is_given
     assert not FreeChoice(period=4.0).is_given
     for choice in ({"logs": (Path("a"),)}, {"spans": ((0.0, 1.0),)}, {"cycles": (1,)}):
-        assert FreeChoice(**choice).is_given  # type: ignore[arg-type]
+        assert FreeChoice(**choice).is_given
 
 
 @pytest.mark.parametrize(
