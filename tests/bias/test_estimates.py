@@ -113,9 +113,6 @@ def test_a_log_in_contact_throughout_is_not_believed_to_be_free():
     assert stated.estimates[0].error_sd is not None
 
 
-# What `best` is made of: the whole log's bias off where it may be, and what stands in for it
-
-
 @pytest.fixture(scope="module")
 def automatic() -> Analysis:
     return asked()

@@ -113,9 +113,6 @@ def test_no_noise_in_the_loaded_part_still_leaves_a_filter():
     np.testing.assert_allclose(r[1], (1e-6 * 0.03) ** 2 * 0.03, rtol=1e-12)
 
 
-# One bad sample, or an hour in which a clock stands still, does not change `best` elsewhere
-
-
 FIXTURE = Path(__file__).parents[2] / "fixtures" / "ur5_circle.csv"
 NEAR = 0.5
 """Around a bad sample its own joint may say anything. [s]"""

@@ -105,9 +105,6 @@ def test_the_band_holds_on_a_real_arm_with_planted_pushes(logs, monkeypatch):
     assert half.mean() <= 2.6 * np.sqrt(np.mean(error**2, axis=0)).mean()
 
 
-# What limits a log: friction apart from other error, the largest cause, the paper's gains
-
-
 RNG = np.random.default_rng(8)
 DQ = RNG.uniform(-1.0, 1.0, (4000, 2))
 
@@ -168,9 +165,6 @@ def test_the_cost_of_the_papers_gains_is_measured_beside_the_best(error, code):
     assert paper_gap(errors.with_columns(rmse_Nm=none), tunings) == ()
 
 
-# A log's free part and spectra: what counts as free, and for which observer the gains are
-
-
 LOG = read(Path(__file__).parents[2] / "fixtures" / "ur5_circle.csv")
 
 
@@ -190,9 +184,6 @@ def test_gains_come_from_the_spectra_where_they_are_asked_for():
     assert Baselines(plain=found, best=blind).spectra(gains=True).gains
     assert Baselines(plain=found, best=blind).spectra(gains=False) == (found.spectra, None, None)
     assert Baselines(plain=blind, best=found).spectra(gains=True) == (None, found.spectra, None)
-
-
-# RefinementChoice: which bias comes off what
 
 
 def test_the_whole_log_s_bias_comes_off_for_everyone_if_asked_for():

@@ -95,9 +95,6 @@ def test_a_log_in_contact_throughout_has_none():
     assert np.count_nonzero(free_samples(worst, 0.02)) == 33
 
 
-# Slow external loads: their columns against Pinocchio, their knots against a dense sum
-
-
 @pytest.mark.parametrize(("name", "joints"), [("ur5", (2, 3)), ("panda", (3, 4))])
 def test_a_force_along_the_arm_is_felt_by_the_joints_before_it(name, joints):
     """J of flange, elbow and wrist on the links before, by Pinocchio: frames there, in world axes.
@@ -143,9 +140,6 @@ def test_a_load_runs_straight_from_knot_to_knot():
             value = values[loads.numbers[k, c]]
             expected += value * hat[:, None] * loads.torque[:, :, c]
     np.testing.assert_allclose(loads.torque_of(values), expected, atol=1e-10)
-
-
-# The normal equations against dense matrices, and the choice of loads against all of them
 
 
 JOINTS, STRIDE = 4, 10

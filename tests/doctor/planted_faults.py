@@ -104,9 +104,6 @@ def edited(signal: Array, joint: int, values: Any) -> Array:
     return copy
 
 
-# The arm, its order and its signs
-
-
 def turned(table: Table, signals: tuple[str, ...], joint: int = 2) -> Table:
     sign = 1.0 - 2.0 * (np.arange(1, table.joints + 1) == joint)
     return replace(table, **{name: sign * getattr(table, name) for name in signals})
@@ -119,18 +116,12 @@ def swapped(table: Table, signals: tuple[str, ...], pair: tuple[int, int] = (2, 
     return replace(table, **{n: v[:, order] for n, v in table.series() if n in signals})
 
 
-# Units
-
-
 def positions_in_degrees(table: Table) -> Table:
     return replace(table, q=np.rad2deg(table.q))
 
 
 def velocities_in_degrees(table: Table) -> Table:
     return replace(table, dq=np.rad2deg(table.dq))
-
-
-# Gravity, loads and offsets
 
 
 def gravity_torque(table: Table, robot: Robot, gravity: Array | None = None) -> Array:
@@ -187,9 +178,6 @@ def saturated(table: Table, joint: int = 2, share: float = 0.6) -> Table:
     return replace(table, effort=edited(table.effort, joint, np.clip(column, -level, level)))
 
 
-# Velocities and efforts that come late, slow or not at all
-
-
 def late(table: Table, signal: str, samples: int) -> Table:
     rows = np.maximum(np.arange(len(table.t)) - samples, 0)
     return replace(table, **{signal: getattr(table, signal)[rows]})
@@ -208,9 +196,6 @@ def stuck(table: Table, signal: str, joint: int, start: float = 0.5) -> Table:
     first = int(start * len(column))
     column[first:] = column[first]
     return replace(table, **{signal: edited(getattr(table, signal), joint, column)})
-
-
-# Clocks and rows
 
 
 def dropped(table: Table, share: float = 0.05, seed: int = 0) -> Table:

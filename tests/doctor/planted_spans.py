@@ -22,8 +22,6 @@ from vftcli.signals.arrays import Array, Mask
 MIDDLE = 0.4
 """Share of the log at which a few bad samples are planted."""
 
-# A few bad samples
-
 
 def first_bad(table: Table) -> int:
     return int(MIDDLE * len(table.t))
@@ -59,9 +57,6 @@ def position_sample(table: Table, degrees: float, joint: int = 3) -> Table:
     return replace(table, q=plant.edited(table.q, joint, column))
 
 
-# Velocities in another unit, or something else
-
-
 def of_joints(table: Table, joints: tuple[int, ...]) -> Mask:
     """Which columns are those of some joints; all if none is named. (n,)"""
     return np.isin(np.arange(1, table.joints + 1), joints or range(1, table.joints + 1))
@@ -78,9 +73,6 @@ def velocity_in_degrees(table: Table, joint: int) -> Table:
 def accelerations(table: Table, joints: tuple[int, ...] = ()) -> Table:
     wrong = of_joints(table, joints)
     return replace(table, dq=np.where(wrong, plant.acceleration(table), table.dq))
-
-
-# Spans in which the effort is no drive's
 
 
 def brakes(table: Table, seconds: float) -> Table:
@@ -120,9 +112,6 @@ def table_with_rows(table: Table, rows: Array) -> Table:
     return replace(table.selected(rows), t=table.t, sound_t=table.sound_t)
 
 
-# Sessions, turns and clocks
-
-
 def glued(table: Table, seconds: float) -> Table:
     """Two sessions in one: so much is left out in the middle, and the clock does not show it."""
     made = plant.dropped_span(table, seconds=seconds)
@@ -153,9 +142,6 @@ def effort_late(table: Table, seconds: float = 0.0, drift: float = 0.0) -> Table
     then = table.t - seconds - drift * (table.t - table.t[0])
     late = [np.interp(then, table.t, column) for column in table.effort.T]
     return replace(table, effort=np.stack(late, axis=1))
-
-
-# The arm, its drives and its load
 
 
 def drive_scale(table: Table, factor: float, joints: tuple[int, ...] = ()) -> Table:
@@ -195,9 +181,6 @@ def motor_side(table: Table) -> Table:
     return plant.with_more_torque(table, lost)
 
 
-# Slow logs
-
-
 def thinned(table: Table, rate: float) -> Table:
     """The table at this rate at most. [Hz]"""
     step = max(1, round(1 / (rate * float(np.median(np.diff(table.t))))))
@@ -212,9 +195,6 @@ def interpolated(table: Table, rate: float) -> Table:
         for name, values in few.series()
     }
     return replace(table, **lines)
-
-
-# Free motion that is none
 
 
 def pushed(table: Table, count: int) -> Table:

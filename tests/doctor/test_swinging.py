@@ -43,9 +43,6 @@ FRICTION = np.sign(DQ) * (1 + 1e-3 * np.sin(np.arange(len(T)))[:, None])
 """Dry friction of 1 N·m, with a ripple of a thousandth lest it stays at its extreme. (T, 6)"""
 
 
-# The clock
-
-
 def log_with(steps: Array) -> Recording:
     """A log of two moving joints whose samples are so far apart. (T - 1,) [s]"""
     t = np.concatenate([[0.0], np.cumsum(steps)])
@@ -150,9 +147,6 @@ def of_rows() -> Iterator[Case]:
     ):
         other = replace(log, **{name: change})
         yield Case(f"stale but for {name}", lambda log=other: said_of(log), Unsaid("stale-rows"))
-
-
-# The signals: each case is the swing with some of them changed
 
 
 def changed(name: str, said: Said | Unsaid, **changes: Any) -> Case:
