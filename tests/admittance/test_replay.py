@@ -12,12 +12,7 @@ from vftcli.admittance.motion import AxisMotion, Drag, JointPath, follow, larges
 from vftcli.robots import load_robot
 from vftcli.robots.chain import flange_jacobian, link_poses
 from vftcli.robots.robot import FlangeSolver
-from vftcli.signals.errors import (
-    ClockError,
-    MissingSignalError,
-    ParameterError,
-    ReferenceTorqueError,
-)
+from vftcli.signals import errors
 from vftcli.signals.pose import exp_matrix
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import fact
@@ -167,12 +162,14 @@ def test_redundant_arm_stays_inside_its_limits():
 def test_a_start_outside_the_limits_and_no_deviation_are_refused():
     record, q = push()
     q[:, 5] = 7.0
-    with pytest.raises(ParameterError, match=r"joint 6 is at 7 rad and may be -6\.283 to 6\.283"):
+    with pytest.raises(
+        errors.ParameterError, match=r"joint 6 is at 7 rad and may be -6\.283 to 6\.283"
+    ):
         run((record, q))
     p = parameters()
-    with pytest.raises(ParameterError, match=r"the start pose has 5 joints; ur5 has 6"):
+    with pytest.raises(errors.ParameterError, match=r"the start pose has 5 joints; ur5 has 6"):
         replay.replay_release(0.3 * np.eye(6)[0], UR5, controllers(p), start=np.zeros(5))
-    with pytest.raises(ParameterError, match=r"--release x=0\.3"):
+    with pytest.raises(errors.ParameterError, match=r"--release x=0\.3"):
         replay.replay_release(np.zeros(6), UR5, controllers(p), start=START)
 
 
@@ -180,7 +177,7 @@ def test_a_log_that_is_nearly_all_gap_is_refused():
     """An hour in a log of seconds would be replayed at the control period."""
     record, q = push()
     late = replace(record, t=record.t + 3600.0 * (np.arange(len(record.t)) > 20))
-    with pytest.raises(ClockError, match=r"the log waits 36\d\d s after .*--interval"):
+    with pytest.raises(errors.ClockError, match=r"the log waits 36\d\d s after .*--interval"):
         run((late, q))
 
 
@@ -342,9 +339,9 @@ def test_a_stored_torque_is_turned_into_its_wrench_and_zeroed():
     np.testing.assert_allclose(found.wrench.known, expected, atol=1e-8)  # κ(J)² times rounding
     assert found.source.values == {"observer": "kfo-fe"}
     assert [remark.code for remark in found.wrench.remarks] == ["zero-removed"]
-    with pytest.raises(MissingSignalError):
+    with pytest.raises(errors.MissingSignalError):
         replay.stored_force(Recording(t=TIMES, q=POSES), UR5, choice(), "kfo-fe")
-    with pytest.raises(ParameterError, match="needs the log itself"):
+    with pytest.raises(errors.ParameterError, match="needs the log itself"):
         replay.stored_force(log, UR5, WrenchChoice(frame="base", solver="smoother"), "kfo-fe")
 
 
@@ -370,5 +367,5 @@ def test_a_truth_file_s_wrench_is_the_force_and_torques_alone_are_none(tmp_path)
     assert force.source.values == {"file": "truth.parquet"}
     columns = {f"tau_ext/{j}": np.zeros(len(TIMES)) for j in range(1, 7)}
     pl.DataFrame({"t": TIMES, **columns}).write_parquet(file)
-    with pytest.raises(ReferenceTorqueError, match="it has no wrench"):
+    with pytest.raises(errors.ReferenceTorqueError, match="it has no wrench"):
         replay.truth_force(Recording(t=TIMES, q=POSES), UR5, choice(), file)

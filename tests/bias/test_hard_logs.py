@@ -22,18 +22,14 @@ from vftcli.robots import RobotChoice, load_robot
 from vftcli.robots.run import Run
 from vftcli.signals.recording import Recording
 
+PANDA = load_robot("panda")
 BEST = AnalysisChoice(observers=ObserverChoice(names=("best",)), contacts=False)
 
 
 @pytest.fixture(scope="module")
-def panda():
-    return load_robot("panda")
-
-
-@pytest.fixture(scope="module")
-def slow(panda):
+def slow():
     """12 s of seven joints at 33 Hz, with a wrong model and .05 N·m of noise."""
-    log = wrong_run(panda, drawn_error(panda), seconds=13.0, noise=0.05).recording
+    log = wrong_run(PANDA, drawn_error(PANDA), seconds=13.0, noise=0.05).recording
     return drawn(log, np.arange(0, len(log.t), 3), log.t[::3])
 
 
@@ -84,18 +80,18 @@ def constant(log, joints):
     ],
 )
 @pytest.mark.parametrize("seed", [1, 2])
-def test_every_joint_of_the_best_is_a_number(slow, panda, seed, stale, jitter, gaps, change):
+def test_every_joint_of_the_best_is_a_number(slow, seed, stale, jitter, gaps, change):
     log = hardened(slow, seed, stale=stale, jitter=jitter, gaps=gaps)
-    analysis = analyse(run_of(log if change is None else change(log), panda, BEST), BEST)
+    analysis = analyse(run_of(log if change is None else change(log), PANDA, BEST), BEST)
     (best,) = analysis.estimates
     assert np.isfinite(best.tau).all()
     assert best.error_sd is None or np.all(best.error_sd > 0.0)
 
 
-def test_an_hour_without_samples_costs_no_band(slow, panda):
+def test_an_hour_without_samples_costs_no_band(slow):
     t = np.where(np.arange(len(slow.t)) < 200, slow.t, slow.t + 3600.0)
     choice = replace(BEST, examiner=Examiner(anyway=True))
-    (best,) = analyse(run_of(replace(slow, t=t), panda, choice), choice).estimates
+    (best,) = analyse(run_of(replace(slow, t=t), PANDA, choice), choice).estimates
     assert np.isfinite(best.tau).all()
     assert np.isfinite(best.error_sd).all()
 

@@ -19,7 +19,7 @@ from vftcli.free_motion.two_cycle import (
     two_cycle_reference,
 )
 from vftcli.readers.reading import read
-from vftcli.robots import Robot, load_robot
+from vftcli.robots import load_robot
 from vftcli.robots.run import Run
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ReferenceTorqueError
@@ -28,16 +28,12 @@ from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark
 from vftcli.simulation import Simulation, load_scenario, simulate
 
+UR5 = load_robot("ur5")
 MOVING = [0, 1, 2, 3, 5]
 """J5 of the circle rests; it is not judged."""
 
 HONEST = (0.7, 1.4)
 """Required: true over reported error."""
-
-
-@pytest.fixture(scope="module")
-def ur5() -> Robot:
-    return load_robot("ur5")
 
 
 @pytest.fixture(scope="module")
@@ -59,28 +55,28 @@ def error_of(reference: ExternalTorque, truth: Array) -> Array:
     return np.asarray(np.sqrt(np.nanmean((reference.tau - truth) ** 2, axis=0)))
 
 
-def test_default_beats_the_commanded_period(circle, ur5):
+def test_default_beats_the_commanded_period(circle):
     """Required: at most 0.6 times its error, mean over J1–J4 and J6."""
-    best = two_cycle_difference(circle.recording, (), ur5)
+    best = two_cycle_difference(circle.recording, (), UR5)
     plain = FreeChoice(period=4.0, alignment="commanded", low_pass=None)
-    commanded = two_cycle_difference(circle.recording, (), ur5, plain)
+    commanded = two_cycle_difference(circle.recording, (), UR5, plain)
     errors = [error_of(r, circle.truth)[MOVING].mean() for r in (best, commanded)]
     assert errors[0] <= 0.6 * errors[1]
 
 
 @pytest.mark.parametrize("low_pass", [None, 12.0, 6.0])
 @pytest.mark.parametrize("rung", RUNGS)
-def test_every_rung_knows_its_error(circle, ur5, rung, low_pass):
+def test_every_rung_knows_its_error(circle, rung, low_pass):
     choice = FreeChoice(period=4.0, alignment=rung, low_pass=low_pass)
-    reference = two_cycle_difference(circle.recording, (), ur5, choice)
+    reference = two_cycle_difference(circle.recording, (), UR5, choice)
     ratio = (error_of(reference, circle.truth) / reference.floor)[MOVING]
     # Required of the default rung; the others take J4's short stops for worse than they are.
     least = HONEST[0] if (rung, low_pass) == ("model", 12.0) else 0.6
     assert np.all((ratio >= least) & (ratio <= HONEST[1])), ratio
 
 
-def test_free_cycle_and_joint_at_rest_are_reported(circle, ur5):
-    reference = two_cycle_difference(circle.recording, (), ur5)
+def test_free_cycle_and_joint_at_rest_are_reported(circle):
+    reference = two_cycle_difference(circle.recording, (), UR5)
     t = circle.recording.t
     assert np.isnan(reference.tau[t < 3.99]).all()  # the free cycle has no reference of its own
     assert np.isfinite(reference.tau[(t > 4.01) & (t < 19.9)]).all()
@@ -95,36 +91,36 @@ def test_free_cycle_and_joint_at_rest_are_reported(circle, ur5):
     assert remarks["alignment-chosen"].values["rung"].endswith(" Hz low-pass")
 
 
-def test_two_free_cycles_measure_the_floor(circle, ur5):
+def test_two_free_cycles_measure_the_floor(circle):
     """Given cycles 2 and 3, both pushed, the measured floor must say how wrong that is."""
     choice = FreeChoice(cycles=(2, 3))
-    pushed = two_cycle_difference(circle.recording, (), ur5, choice)
-    free = two_cycle_difference(circle.recording, (), ur5)
+    pushed = two_cycle_difference(circle.recording, (), UR5, choice)
+    free = two_cycle_difference(circle.recording, (), UR5)
     assert np.all(pushed.floor[MOVING] > 1.5 * free.floor[MOVING])
     assert "floor-measured" in {r.code for r in pushed.remarks if isinstance(r, Remark)}
 
 
-def test_missing_samples(circle, ur5):
+def test_missing_samples(circle):
     """Five per cent lost at random and a gap of 0.2 s: still honest, and the gap is left out."""
     log = circle.recording
     keep = np.random.default_rng(2).random(log.samples) > 0.05
     keep[100:125] = False
     names = ("t", "q", "dq", "current")
     cut = Recording(**{n: getattr(log, n)[keep] for n in names}, robot_hint=log.robot_hint)
-    reference = two_cycle_difference(cut, (), ur5)
+    reference = two_cycle_difference(cut, (), UR5)
     ratio = (error_of(reference, circle.truth[keep]) / reference.floor)[MOVING]
     assert np.all((ratio >= HONEST[0]) & (ratio <= HONEST[1])), ratio
     hole = (cut.t > 4.0 + 0.85) & (cut.t < 4.0 + 0.95)  # samples 100 to 124 one cycle later
     assert np.isnan(reference.tau[hole]).all()
 
 
-def test_options_that_do_not_go_with_the_logs(circle, ur5):
+def test_options_that_do_not_go_with_the_logs(circle):
     with pytest.raises(ReferenceTorqueError, match=r"between 0 and 62\.5 Hz"):
-        two_cycle_difference(circle.recording, (), ur5, FreeChoice(low_pass=80.0))
+        two_cycle_difference(circle.recording, (), UR5, FreeChoice(low_pass=80.0))
     source = replace(circle.recording.source, path=Path("other.csv"), t0=1.0)  # another run
     other = replace(circle.recording, source=source)
     with pytest.raises(ReferenceTorqueError, match="leave them out with --free"):
-        two_cycle_difference(circle.recording, other, ur5, FreeChoice(period=4.0))
+        two_cycle_difference(circle.recording, other, UR5, FreeChoice(period=4.0))
 
 
 @pytest.mark.parametrize("pair", ["ab", "ac", "ba", "bc", "ca", "cb"])
@@ -187,11 +183,11 @@ def test_a_payload_is_seen(logs):
     assert mass == pytest.approx(2.805, rel=0.1)
 
 
-def test_at_a_low_rate_the_low_pass_is_two_fifths_of_nyquist(circle, ur5):
+def test_at_a_low_rate_the_low_pass_is_two_fifths_of_nyquist(circle):
     """Every fourth of 125 samples a second: .4 · 15.625 Hz."""
     log = circle.recording
     thin = Recording(t=log.t[::4], q=log.q[::4], dq=log.dq[::4], current=log.current[::4])
-    remarks = two_cycle_difference(thin, (), ur5).remarks
+    remarks = two_cycle_difference(thin, (), UR5).remarks
     floors = [r for r in remarks if r.code == "alignment-floor"]
     assert floors[1].values["rung"].endswith(" + 6.25 Hz low-pass")
 

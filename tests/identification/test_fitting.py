@@ -23,13 +23,8 @@ from vftcli.robots.friction import friction_torque
 from vftcli.robots.kernels import chain_parameters, torque_regressor
 from vftcli.robots.profile import robot_toml
 from vftcli.robots.terms import gravity_torque
+from vftcli.signals import errors
 from vftcli.signals.arrays import root_mean_squares
-from vftcli.signals.errors import (
-    IdentificationError,
-    MissingSignalError,
-    ParameterError,
-    RobotError,
-)
 from vftcli.signals.recording import Recording
 
 
@@ -205,7 +200,7 @@ def hardly(share):
 
 
 HEAVY = replace(HAND, mass=2.5, com=np.array([0.0, 0.0, 0.05]))
-LITTLE, MISSING = IdentificationError, MissingSignalError
+LITTLE, MISSING = errors.IdentificationError, errors.MissingSignalError
 
 
 @pytest.mark.parametrize(
@@ -229,7 +224,7 @@ def test_a_log_that_tells_little_or_contradicts_its_arm_is_refused(made, method,
 
 
 @pytest.mark.parametrize(
-    ("name", "error"), [("panda", RobotError), ("ur10e", IdentificationError)]
+    ("name", "error"), [("panda", errors.RobotError), ("ur10e", errors.IdentificationError)]
 )
 def test_the_wrong_robot_is_refused(name, error):
     with pytest.raises(error, match="another"):
@@ -247,7 +242,7 @@ def test_the_wrong_robot_is_refused(name, error):
     ],
 )
 def test_tasks_that_make_no_sense_are_refused(options, match):
-    with pytest.raises(ParameterError, match=match):
+    with pytest.raises(errors.ParameterError, match=match):
         Task(**options)
 
 
@@ -324,7 +319,7 @@ def test_what_a_paper_printed_of_the_profile_is_not_said_of_another_arm():
 
 def test_the_heavier_log_is_refused_as_the_free_one_whatever_its_name():
     free, loaded = two_folders(log(UR5, 1), log(UR5.with_payload(HAND), 1))
-    with pytest.raises(IdentificationError, match="swap the two logs"):
+    with pytest.raises(errors.IdentificationError, match="swap the two logs"):
         identify([free], UR5, Task(method="payload"), free=loaded)
 
 
@@ -358,7 +353,7 @@ def test_a_simulators_arm_has_no_friction(method):
 def test_torques_behind_the_gears_leave_the_friction_method_nothing_to_find():
     """Without friction: the rotor is before the gear, the links are the profile's."""
     robot = replace(UR5, torque_source="link_torque", torque_constant=None).without_friction()
-    with pytest.raises(IdentificationError, match="nothing to find"):
+    with pytest.raises(errors.IdentificationError, match="nothing to find"):
         identify([log(robot)], robot, Task(method="friction", friction=False))
     found = identify([log(robot)], robot, Task(method="base", friction=False))
     assert found.robot.friction == ()

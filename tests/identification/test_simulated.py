@@ -34,13 +34,6 @@ def train():
 
 
 @pytest.fixture(scope="module")
-def other():
-    """Another trajectory of the same arm: the circle, untouched."""
-    scenario = load_scenario("ur5-circle", [*MISMATCH, "contacts=[]"])
-    return simulate(scenario, SEED).recording
-
-
-@pytest.fixture(scope="module")
 def truth() -> Robot:
     arm, _ = build(load_scenario("free-excitation", [STICKS]), SEED)
     profile, true = load_robot("ur5"), arm.true
@@ -82,7 +75,8 @@ def test_friction_rotor_and_constants_come_back_within_five_per_cent(train, trut
 
 
 @pytest.mark.slow
-def test_another_trajectory_is_predicted_to_the_noise_floor(train, other, truth):
+def test_another_trajectory_is_predicted_to_the_noise_floor(train, truth):
+    other = simulate(load_scenario("ur5-circle", [*MISMATCH, "contacts=[]"]), SEED).recording
     found = identify([train], load_robot("ur5"), Task(method="base"), [other])
     trace = next(t for t in found.traces if t.role == "held-out")
     motion = prepare(other, truth)
