@@ -15,11 +15,10 @@ from typing import Any, NamedTuple
 import numpy as np
 import polars as pl
 import pytest
+from example_logs import FIXTURES
 from made_runs import command as run
 
 from vftcli.signals.errors import VftError
-
-FIXTURES = Path(__file__).parent.parent / "fixtures"
 
 SAME = 1e-6
 """Equal to six digits: relations move inputs by rounding at most (a clock of 1e6 s keeps 1e-10 s

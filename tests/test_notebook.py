@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from example_logs import CIRCLE, FIXTURES, TAPS
 from made_runs import command
 
 import vftcli as vft
@@ -15,9 +16,6 @@ from vftcli.free_motion import FreeChoice
 from vftcli.pipeline import AnalysisChoice, analyse_logs, list_touches
 from vftcli.robots import RobotChoice
 
-ROOT = Path(__file__).parents[1]
-TAPS = ROOT / "fixtures" / "ur5_taps_ur_rtde.csv"
-CIRCLE = ROOT / "fixtures" / "ur5_circle.csv"
 T, Q = np.linspace(0.0, 1.0, 11), np.zeros((11, 6))
 
 
@@ -157,7 +155,7 @@ def test_robots_scenarios_and_replays_are_asked_for(tmp_path: Path) -> None:
     assert len(examined.remarks.to_polars()) == len(examined.remarks)
     rows = vft.admit(robot="ur5", alpha=[1, 1.6], release="x=0.3")
     assert rows["alpha"].to_list() == [None, 1.0, 1.6]
-    mine = vft.identify(ROOT / "fixtures" / "ur5_table1.csv", "ur5", "friction")
+    mine = vft.identify(FIXTURES / "ur5_table1.csv", "ur5", "friction")
     mine.save(tmp_path / "mine.toml")
     assert vft.load_robot(tmp_path / "mine.toml").friction == mine.friction
     with pytest.raises(vft.VftError, match="--force"):

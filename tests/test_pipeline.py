@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 import polars as pl
 import pytest
+from example_logs import CIRCLE
 from made_runs import analyse_log, command
 from scipy.signal import butter, sosfiltfilt
 
@@ -33,7 +34,6 @@ from vftcli.signals.errors import MissingSignalError, RobotError
 from vftcli.signals.progress import heard_by
 from vftcli.signals.remarks import Remark
 
-FIXTURE = Path(__file__).parents[1] / "fixtures" / "ur5_circle.csv"
 UR10E = "t,q:6,dq:6,current:6,target_current:6,target_torque:6"
 
 
@@ -58,7 +58,7 @@ def touched(log: object, robot: str) -> list[Remark]:
 
 def test_errors_against_zero_name_the_longest_span_without_contact() -> None:
     """60 N on the flange, twice in 4 s of free motion, as the current that they take."""
-    free, arm = vft.read(FIXTURE).between(0.0, 4.0), vft.load_robot("ur5")
+    free, arm = vft.read(CIRCLE).between(0.0, 4.0), vft.load_robot("ur5")
     assert touched(free, "ur5") == []
     current, J = free.require("current").copy(), flange_jacobian(arm.chain, free.q)
     for start, stop in ((0.5, 1.0), (3.3, 3.6)):
@@ -84,7 +84,7 @@ def test_hands_and_no_loads_are_seen_in_real_logs(name: str, count: int, logs: P
 
 
 def test_a_run_is_made_once_for_a_recording_and_a_robot() -> None:
-    circle, arm, choice = vft.read(FIXTURE), vft.load_robot("ur5"), AnalysisChoice()
+    circle, arm, choice = vft.read(CIRCLE), vft.load_robot("ur5"), AnalysisChoice()
     first = pipeline.run_of(circle, arm, choice)
     assert pipeline.run_of(circle, arm, choice) is first
     assert first.terms is first.terms
@@ -100,7 +100,7 @@ def rmse_of(analysis: vft.Analysis, observer: str = "gmo") -> np.ndarray:
 
 @pytest.mark.slow
 def test_a_fixture_goes_all_the_way_to_a_table() -> None:
-    analysis = analyse_log(FIXTURE, asked("ur5", f"file:{FIXTURE}.truth.parquet"))
+    analysis = analyse_log(CIRCLE, asked("ur5", f"file:{CIRCLE}.truth.parquet"))
     joint_rows = analysis.errors
     assert joint_rows.height == 5 * 6
     named = joint_rows["observer"].unique(maintain_order=True).to_list()
@@ -123,18 +123,18 @@ def test_a_fixture_goes_all_the_way_to_a_table() -> None:
 @pytest.mark.slow
 def test_the_log_must_settle_its_robot_or_be_reported() -> None:
     """The controller's own torques tell a UR5; currents alone settle nothing."""
-    reported = analyse_log(FIXTURE, AnalysisChoice())
+    reported = analyse_log(CIRCLE, AnalysisChoice())
     assert reported.robot.name == "ur5"
     assert "robot-guessed" in [remark.code for remark in reported.robot.remarks]
     measured = ReadChoice(signals=frozenset({"dq", "current"}))
     with pytest.raises(RobotError, match=r"^Which arm\? .*Add --robot ur"):
-        analyse_log(FIXTURE, AnalysisChoice(read=measured))
+        analyse_log(CIRCLE, AnalysisChoice(read=measured))
 
 
 def test_as_printed_differs_and_says_so_and_an_interval_keeps_the_logs_own_time() -> None:
     short = asked("ur5", read=ReadChoice(interval=(4.0, 6.0)))
-    printed = analyse_log(FIXTURE, replace(short, observers=ObserverChoice(as_printed=True)))
-    corrected = analyse_log(FIXTURE, replace(short, observers=ObserverChoice(causal=True)))
+    printed = analyse_log(CIRCLE, replace(short, observers=ObserverChoice(as_printed=True)))
+    corrected = analyse_log(CIRCLE, replace(short, observers=ObserverChoice(causal=True)))
     assert "as-printed" in {r.code for r in printed.remarks if isinstance(r, Remark)}
     assert corrected.contacts is None  # they need the complete log
     assert 4.0 <= printed.t[0] < printed.t[-1] <= 6.0
@@ -149,7 +149,7 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
     The clocks of the two single cycles are alike; nothing touches the arm in the second log.
     """
     folder, paths = tmp_path_factory.mktemp("runs"), []
-    table = pl.read_csv(FIXTURE, separator=" ")
+    table = pl.read_csv(CIRCLE, separator=" ")
     for name, first, count in (("load", 700, 1000), ("free", 0, 520), ("more", 500, 520)):
         paths.append(folder / f"{name}.csv")
         rows = table.slice(first, count).with_columns(timestamp=table["timestamp"][:count])
@@ -186,7 +186,7 @@ def test_every_log_is_read_modelled_and_aligned_once(
     count(modelled, "dynamics_terms")
     count(free_motion, "align")
     names = {"LOAD": runs[0], "FREE": runs[1], "MORE": runs[2], "OUT": tmp_path / "out"}
-    names["TRUTH"] = Path(f"file:{FIXTURE}.truth.parquet")
+    names["TRUTH"] = Path(f"file:{CIRCLE}.truth.parquet")
     names["OUT.toml"] = tmp_path / "gains.toml"
     command(*(names.get(word, word) for word in words.split()), "--robot", "ur5")
     assert counted == {"read_chosen": reads, "dynamics_terms": models, "align": alignments}
@@ -211,7 +211,7 @@ def test_the_steps_of_a_log_fill_its_work_without_a_gap() -> None:
     heard: list[tuple[str, float]] = []
     choice = asked("ur5", "", "gmo", read=ReadChoice(interval=(0.0, 6.0)))
     with heard_by(lambda *step: heard.append(step)):
-        assert analyse_log(FIXTURE, choice).contacts is not None
+        assert analyse_log(CIRCLE, choice).contacts is not None
     words, begins = zip(*[step for step in heard if step[0]], strict=True)
     verbs = ["reading", "examining", "looking", "listing", "running", "comparing"]
     assert [each.rpartition(": ")[2].split()[0] for each in words] == verbs
@@ -223,7 +223,7 @@ def test_the_steps_of_a_log_fill_its_work_without_a_gap() -> None:
 
 def test_what_is_derived_from_the_complete_log_is_said_and_kept_from_what_runs_online(tmp_path):
     kept = {f"actual_{name}_{j}": f"{name}_{j}" for name in ("q", "current") for j in range(6)}
-    table = pl.read_csv(FIXTURE, separator=" ").rename({"timestamp": "t", **kept})
+    table = pl.read_csv(CIRCLE, separator=" ").rename({"timestamp": "t", **kept})
     path = tmp_path / "log.csv"
     table.select("t", *kept.values()).write_csv(path)
     words = (path, "--robot", "ur5", "--observer", "gmo")

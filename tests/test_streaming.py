@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import polars as pl
 import pytest
+from example_logs import BEARING, CIRCLE
 from made_runs import command
 
 from vftcli import pipeline
@@ -26,8 +27,6 @@ from vftcli.signals.external_torque import DynamicsTerms
 from vftcli.signals.recording import Recording
 from vftcli.wrench import WrenchChoice, ZeroChoice
 
-FIXTURE = Path(__file__).parents[1] / "fixtures" / "ur5_circle.csv"
-
 
 @pytest.fixture
 def in_blocks(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -38,7 +37,7 @@ def in_blocks(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(pipeline, "PIECE", 320)
 
 
-def estimated(folder: Path, *words: str, log: Path = FIXTURE) -> tuple[pl.DataFrame, Any]:
+def estimated(folder: Path, *words: str, log: Path = CIRCLE) -> tuple[pl.DataFrame, Any]:
     """The table and the record of an estimate of a log, the fixture's if none is given."""
     command("estimate", log, "--robot", "ur5", "-o", folder, *words)
     record = json.loads((folder / "run.json").read_text("utf-8"))
@@ -77,10 +76,9 @@ def test_numbers_and_record_of_the_whole(tmp_path: Path, request, words: tuple[s
 def test_the_wrench_of_seven_joints_comes_in_blocks_too(tmp_path: Path, request) -> None:
     """Before any estimate there is none to take the null space of: it was a traceback."""
     words = "--robot", "panda", "--causal", "--wrench", "--observer", "gmo", "--anyway"
-    log = FIXTURE.with_name("panda_bearing.csv")
-    whole, _ = estimated(tmp_path / "whole", *words, log=log)
+    whole, _ = estimated(tmp_path / "whole", *words, log=BEARING)
     request.getfixturevalue("in_blocks")
-    made, _ = estimated(tmp_path / "blocks", *words, log=log)
+    made, _ = estimated(tmp_path / "blocks", *words, log=BEARING)
     check_equal(made, whole)
     assert made["null_space/gmo"].max() > 0.0
 
@@ -140,7 +138,7 @@ def test_what_needs_all_of_a_log_at_once_has_it(asked, log, blocks):
 @pytest.mark.parametrize("words", [("--causal",), ("--causal", "--wrench")])
 def test_bad_samples_are_cut_out_as_of_the_whole(tmp_path: Path, request, words) -> None:
     """A velocity that no arm has, in the last tenth: the row goes, and the numbers are equal."""
-    path, rows = tmp_path / "log.csv", pl.read_csv(FIXTURE, separator=" ")
+    path, rows = tmp_path / "log.csv", pl.read_csv(CIRCLE, separator=" ")
     late, speed = pl.int_range(rows.height) == int(0.95 * rows.height), pl.col("actual_qd_2")
     rows = rows.with_columns(pl.when(late).then(3.0).otherwise(speed).alias("actual_qd_2"))
     rows.write_csv(path, separator=" ")
@@ -175,7 +173,7 @@ with open("/proc/self/status") as status:
 
 def peak_memory(samples: int, folder: Path) -> int:
     """Peak memory of `estimate --causal` of the fixture's motion over and over. [B]"""
-    short = read(FIXTURE)
+    short = read(CIRCLE)
     rows = np.arange(samples) % short.samples
     columns = {"timestamp": np.arange(samples) * 0.008}
     for field, values in (("q", short.q), ("qd", short.dq), ("current", short.current)):

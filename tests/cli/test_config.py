@@ -156,25 +156,6 @@ def test_files_are_named_from_the_folder_of_the_file(run, here: Path) -> None:
     assert (code, "gives --robot ur5 --free 0.3:4 (" in err) == (0, True)
 
 
-def test_switches_and_numbers_are_kept_as_they_are_typed(run, here: Path) -> None:
-    """Of one log too, whose own name alone is left out of what is free."""
-    keep(here, 'robot = "ur5"\nanyway = true\ndetails = true\n[contacts]\nall = true\n')
-    _, _, err = run("contacts", CIRCLE, "--interval", "0:2")
-    gives = err.splitlines()[0]
-    for word in ("--robot ur5", "--anyway", "--details", "--all"):
-        assert word in gives
-
-
-def test_an_option_that_a_command_takes_otherwise_is_its_own_table_s(run, here: Path) -> None:
-    """`identify --free` is the motion without a load; `thresholds --reference` is of --check."""
-    keep(here, 'robot = "ur5"\nreference = "two-cycle"\n')
-    _, _, err = run("thresholds", CIRCLE, "--interval", "0:1")
-    assert err.startswith("note: vftcli.toml gives --robot ur5 (")
-    assert "--check" not in err
-    keep(here, 'robot = "ur5"\n[thresholds]\nreference = "two-cycle"\n')
-    assert "--check" in run("thresholds", CIRCLE)[2]
-
-
 def test_the_file_is_an_input_that_nothing_writes_over(refused, here: Path) -> None:
     kept = keep(here, 'robot = "ur5"\n')
     error = refused("identify", CIRCLE, "--method", "gains", "-o", kept, "--force")
@@ -189,14 +170,27 @@ def test_every_option_kept_otherwise_exists() -> None:
         assert keys <= {*config.options_of(every[command]), *settings}
 
 
-def test_settings_of_a_group_that_is_called_as_a_command_stand_in_its_table(run, here) -> None:
-    of_identify = '[identify]\ncutoff = 5\nmethod = "guess"\n'
-    keep(here, f'robot = "ur5"\n{of_identify}[two-cycle]\nperiod = 4\n')
-    code, _, err = run("identify", CIRCLE)
-    assert (code, "there is friction, base" in err) == (1, True)
-    for word in ("--set identify.cutoff=5", "--set two-cycle.period=4", "--method guess"):
-        assert word in err
-    assert "--method" not in run("compare", CIRCLE, "--reference", "zero", "--interval", "0:1")[2]
+IDENTIFY = '[identify]\ncutoff = 5\nmethod = "guess"\n[two-cycle]\nperiod = 4\n'
+
+
+@pytest.mark.parametrize(("kept", "words", "gives"), [
+    ("anyway = true\ndetails = true\n[contacts]\nall = true\n", "contacts --interval 0:2",
+     "--robot ur5 --all --anyway --details"),
+    # `thresholds --reference` is of --check.
+    ('reference = "two-cycle"\n', "thresholds --interval 0:1", "--robot ur5"),
+    ('[thresholds]\nreference = "two-cycle"\n', "thresholds", "--robot ur5 --reference two-cycle"),
+    # The group of a setting may be called as a command.
+    (IDENTIFY, "identify",
+     "--set identify.cutoff=5 --set two-cycle.period=4 --robot ur5 --method guess"),
+    (IDENTIFY, "compare --reference zero --interval 0:1", "--set two-cycle.period=4 --robot ur5"),
+])  # fmt: skip
+def test_a_command_is_given_what_it_takes(run, here: Path, kept, words, gives) -> None:
+    keep(here, f'robot = "ur5"\n{kept}')
+    command, *more = words.split()
+    note, *rest = run(command, CIRCLE, *more)[2].splitlines()
+    given = note.partition(" gives ")[2].partition(" (")[0]
+    assert given == gives
+    assert any("--check" in line for line in rest) == ("thresholds]" in kept)
 
 
 def test_a_typed_setting_goes_before_a_kept_one(run, here: Path) -> None:

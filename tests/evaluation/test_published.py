@@ -33,9 +33,8 @@ def test_sizes_and_winners_are_reported() -> None:
     sizes = by_code["print-sizes"]
     # GMO has FDO's numbers on J4 to J6, which the paper prints as larger there
     ratios = np.array(TABLE_1.rmse["fdo"])[3:] / np.array(TABLE_1.rmse["gmo"])[3:]
-    assert [sizes[k] for k in ("median", "least", "most")] == pytest.approx(
-        [1.5, 1.5, 1.5 * ratios.max()]
-    )
+    found_sizes = [sizes[k] for k in ("median", "least", "most")]
+    assert found_sizes == pytest.approx([1.5, 1.5, 1.5 * ratios.max()])
     # J6 of all four in print, and the reference's own error there
     floor = by_code["print-noise-floor"]
     assert [floor[k] for k in ("least_Nm", "most_Nm", "floor_Nm")] == [0.9322, 0.9443, 0.4]
@@ -46,9 +45,8 @@ def test_sizes_and_winners_are_reported() -> None:
     kalman = KalmanObserver(noise_convention="discrete")
     tunings = {**TUNINGS, kalman.name: kalman.tuning(STEP, 6)}
     said = compare_with("table1", errors(), (*OBSERVERS[:2], kalman), tunings).remarks
-    assert {r.code: r.values.get("delay_ms") for r in said}["print-kalman-discrete"] == (
-        pytest.approx(39.0, abs=0.5)
-    )
+    delays = {r.code: r.values.get("delay_ms") for r in said}
+    assert delays["print-kalman-discrete"] == pytest.approx(39.0, abs=0.5)
 
 
 def test_what_cannot_be_compared() -> None:
@@ -70,19 +68,6 @@ def test_fdo_and_gmo_are_one_filter_to_a_millionth() -> None:
     assert remark.where.joints == (4, 6)
     # The largest printed difference there: J4, 1.5379 − 1.2939 N·m.
     assert remark.values["printed_Nm"] == pytest.approx(0.2440)
-
-
-def test_floors_and_unknown_errors_stand_in_their_joints() -> None:
-    joint = pl.col("joint")
-    table = errors().with_columns(
-        rmse_Nm=pl.when(joint != 2).then(pl.col("rmse_Nm")),
-        reference_floor_Nm=pl.when(joint != 3).then(0.1 * joint),
-    )
-    found = compare_with("table1", table, OBSERVERS, TUNINGS)
-    assert np.isnan(found.ours["fdo"][1])
-    assert np.isfinite(np.delete(found.ours["fdo"], 1)).all()
-    assert found.floor[[0, 1, 3, 4, 5]] == pytest.approx([0.1, 0.2, 0.4, 0.5, 0.6])
-    assert np.isnan(found.floor[2])
 
 
 PRINTED = """

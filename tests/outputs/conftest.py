@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from contact_rows import contact, contact_list
+from example_logs import CIRCLE
 from made_runs import analyse_log
 
 from vftcli.analysis import Analysis
@@ -101,9 +102,8 @@ def as_if() -> Callable[..., Analysis]:
 @pytest.fixture(scope="session")
 def pushed() -> Analysis:
     """The simulated UR5 on a circle, pushed twelve times, judged by the two-cycle difference."""
-    log = Path(__file__).parents[2] / "fixtures" / "ur5_circle.csv"
     two_cycle = ReferenceChoice(name="two-cycle")
-    return analyse_log(log, AnalysisChoice(robot=RobotChoice(name="ur5"), reference=two_cycle))
+    return analyse_log(CIRCLE, AnalysisChoice(robot=RobotChoice(name="ur5"), reference=two_cycle))
 
 
 BROWSERS = "chromium", "chromium-browser", "google-chrome"
@@ -149,9 +149,8 @@ class Tab:
 @pytest.fixture(scope="session")
 def browser() -> Iterator[Any]:
     """A real browser without a window; skips where there is none."""
-    playwright = pytest.importorskip(
-        "playwright.sync_api", reason="no page is opened: the package playwright is not installed"
-    )
+    lacking = "no page is opened: the package playwright is not installed"
+    playwright = pytest.importorskip("playwright.sync_api", reason=lacking)
     program = next(filter(None, map(shutil.which, BROWSERS)), None)
     if program is None:
         pytest.skip(f"no page is opened: none of {', '.join(BROWSERS)} is installed")

@@ -93,18 +93,6 @@ def test_what_the_pose_hides_is_apart(analysis: Analysis) -> None:
         assert table["sd/reference/6"].to_list() == rising.tolist()
 
 
-def test_groups_of_rows_hold_the_same_table(analysis, tmp_path, monkeypatch):
-    write_estimates(tmp_path / "whole.parquet", analysis)
-    monkeypatch.setattr("vftcli.outputs.estimates.GROUP_ROWS", 300)
-    write_estimates(tmp_path / "groups.parquet", analysis)
-    whole, groups = (pl.read_parquet(tmp_path / f"{n}.parquet") for n in ("whole", "groups"))
-    assert whole.equals(groups, null_equal=True)
-    files = [pq.ParquetFile(tmp_path / f"{n}.parquet") for n in ("whole", "groups")]
-    assert files[1].num_row_groups == -(-len(whole) // 300)
-    described = [[field.metadata for field in file.schema_arrow] for file in files]
-    assert described[0] == described[1]
-
-
 def test_a_log_in_blocks_gives_the_same_folder(analysis: Analysis, tmp_path: Path) -> None:
     choice = OutputChoice(extras=("csv",))
     write_estimate_folder(tmp_path / "whole", analysis, "", choice)

@@ -66,15 +66,6 @@ def test_a_link_is_written_through_and_a_device_straight(tmp_path: Path) -> None
     assert Path("/dev/null").is_char_device()
 
 
-def test_a_folder_gets_all_files_at_once(tmp_path: Path) -> None:
-    out = tmp_path / "new" / "out"
-    with OutputFolder(out, names=["a.txt"]) as folder:
-        (folder / "a.txt").write_text("a")
-        (folder / "sub/b.txt").write_text("b")
-        assert not (out / "a.txt").exists()
-    assert texts(out) == {"a.txt": "a", "sub": "", "sub/b.txt": "b"}
-
-
 def test_a_failing_folder_leaves_what_was_there(tmp_path: Path) -> None:
     with pytest.raises(KeyboardInterrupt), OutputFolder(tmp_path / "new" / "out") as folder:
         cut_short(folder / "a.txt")
@@ -181,21 +172,6 @@ def test_what_is_read_is_kept(tmp_path: Path, given: str, refused: str, free: st
             refuse_existing(tmp_path / name, force=True)
     for name in refused.split():
         refuse_existing(tmp_path / name, force=True)
-
-
-def test_the_seal_goes_first_comes_last(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    moved = []
-    move = Path.replace
-
-    def reported(self: Path, target: Path) -> Path:
-        moved.append(self.name if self.parent == tmp_path else target.name)
-        return move(self, target)
-
-    sealed(tmp_path, {"a.txt": "a", "z.txt": "z"})
-    monkeypatch.setattr(Path, "replace", reported)
-    sealed(tmp_path, {"a.txt": "a", "z.txt": "z"})
-    assert moved[0] == moved[-1] == "run.json"
-    assert len(moved) == 6  # three files go and come
 
 
 def test_leftovers_of_the_dead_go_and_those_of_the_living_stay(tmp_path: Path) -> None:

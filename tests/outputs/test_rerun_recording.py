@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import rerun.chunk
 from contact_rows import contact, contact_list
+from example_logs import CIRCLE
 from made_runs import analyse_log
 from rerun_rows import rows_of, times_of
 
@@ -34,8 +35,6 @@ from vftcli.signals.remarks import Where, caution
 from vftcli.signals.wrench import AXES
 from vftcli.wrench import WrenchChoice, ZeroChoice
 from vftcli.wrench.solvers import frame_pose
-
-CIRCLE = Path(__file__).parents[2] / "fixtures" / "ur5_circle.csv"
 
 
 @pytest.fixture(scope="module")

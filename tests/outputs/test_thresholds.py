@@ -115,11 +115,9 @@ def test_the_record_has_the_keys_of_the_contract_and_is_strict_json() -> None:
     counted = (CountedAlarms("a.csv", 0.5, 0.5, (0,) * 7, 0, 1),)
     text = json.dumps(jsonable(thresholds_record(made(), counted, [check()])), allow_nan=False)
     record = json.loads(text)
-    assert {"rate_per_h", "joints", "axes", "calls"} <= set(record)
-    assert {"joint", "threshold_Nm", "interval_Nm"} <= set(record["joints"][0])
     assert [row["joint"] for row in record["joints"]] == [1, 2, 3, 4, 5, 6, 7]
-    assert {"axis", "threshold_N", "interval_N"} <= set(record["axes"][0])
-    assert {"axis", "threshold_Nm", "interval_Nm"} <= set(record["axes"][5])
+    assert record["joints"][0]["interval_Nm"] == [0.0, 2.0]
+    assert record["axes"][5]["interval_Nm"] == [14.0, 16.0]
     assert [row["axis"] for row in record["axes"]] == ["fx", "fy", "fz", "mx", "my", "mz"]
     assert record["force"]["threshold_N"] == pytest.approx(30.001)
     # k = 30 of 900 readings of a second: 120 an hour, a quarter of one.

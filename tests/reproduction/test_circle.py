@@ -23,9 +23,8 @@ One commit on two processors gave .0400 and .0672 s to the turn.
 
 def documented(name: str) -> dict[str, list[str]]:
     """Label of a line → what the document's table of an item has of ours."""
-    text = (
-        DOCUMENT.read_text("utf-8").split(f"## {HUANG.items[name].label}: ")[1].split("\n## ")[0]
-    )
+    text = DOCUMENT.read_text("utf-8").partition(f"## {HUANG.items[name].label}: ")[2]
+    text = text.partition("\n## ")[0]
     rows = [line.strip("| ").split(" | ") for line in text.splitlines() if line.startswith("| ")]
     return {row[0].replace("\\", ""): row[3:] for row in rows[2:]}
 
@@ -54,9 +53,8 @@ def test_the_first_seed_lies_in_the_documents_range() -> None:
 
     The tapped circle, the sensor, the dragged loop and the bearing: an experiment each.
     """
-    for name, shown in computed(
-        ("table1", "fig3", "fig4", "fig6", "fig7", "fig12"), fast=True
-    ).items():
+    names = ("table1", "fig3", "fig4", "fig6", "fig7", "fig12")
+    for name, shown in computed(names, fast=True).items():
         document, compared = documented(name), 0
         for line in shown.lines:
             kinds = (*shown.variants, "floor")

@@ -5,12 +5,12 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from example_logs import CIRCLE
 
 from vftcli.batch.log_work import digest_of
 from vftcli.reproduction.manifest import Manifest, Rival, load_manifest, rival_of
 from vftcli.signals.errors import ParameterError
 
-CIRCLE = Path(__file__).parents[2] / "fixtures" / "ur5_circle.csv"
 ENTRY = '[[log]]\nname = "a"\narm = "UR5"\ntruth = "free"\nfile = "a.csv"\nday = "monday"\n'
 
 

@@ -104,10 +104,7 @@ def test_only_what_is_shown_stands_in_the_small_pictures_and_names_are_words() -
     assert "legend" not in shell.part("svg/multiples", chart(t, lines[0]))  # one line needs none
     doubtful = chart(t, lines[0])._replace(panels=("J1†", "J2"))
     assert "†: the joint rests most of the time" in shell.part("svg/multiples", doubtful)
-    for text in (
-        html,
-        shell.part("svg/axes", SCALES, "<i>"),
-        shell.part("svg/svg", shell.Box(), "<i>", "<g/>"),
-    ):
+    axes = shell.part("svg/axes", SCALES, "<i>")
+    for text in (html, axes, shell.part("svg/svg", shell.Box(), "<i>", "<g/>")):
         assert "<i>" not in text
         assert "&lt;i&gt;" in text

@@ -5,11 +5,11 @@ import io
 import re
 from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from example_logs import BEARING
 from made_runs import analyse_log
 from test_shapes import sphere
 
@@ -172,8 +172,7 @@ def test_the_arm_has_poses(opened: Callable, request: pytest.FixtureRequest, nam
 @pytest.fixture(scope="session")
 def recording_of_a_panda() -> Analysis:
     """Seven joints of the simulated Panda that lifts a bearing."""
-    log = Path(__file__).parents[3] / "fixtures" / "panda_bearing.csv"
-    return analyse_log(log, AnalysisChoice(robot=RobotChoice(name="panda"), contacts=False))
+    return analyse_log(BEARING, AnalysisChoice(robot=RobotChoice(name="panda"), contacts=False))
 
 
 #: Calls of the canvas in a frame of play: of the charts, and of the arm with what goes along.
