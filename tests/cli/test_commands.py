@@ -353,9 +353,14 @@ REPEATS = "jointwise_4.csv free_repeat_a.csv free_repeat_b.csv free_repeat_c.csv
 UR10E = ("--robot", "ur10e", "--columns", "t,q:6,dq:6,current:6,target_current:6,target_torque:6")
 
 
-@pytest.mark.parametrize("name", [*FREE.split(), *REPEATS.split()])
+FREE_LOGS = {f"ur10e/{name}": UR10E for name in (*FREE.split(), *REPEATS.split())}
+FREE_LOGS["salerno_ur10/ur10_exciting.db3"] = ("--robot", "ur10", "--columns=tau=effort")
+FREE_LOGS["ur3/identification.bag"] = ("--robot", "ur3", "--columns=-tau")
+
+
+@pytest.mark.parametrize("name", FREE_LOGS)
 def test_real_free_logs_are_accepted(name: str, logs: Path, run) -> None:
-    code, out, err = run("thresholds", logs / "ur10e" / name, *UR10E, "--json")
+    code, out, err = run("thresholds", logs / name, *FREE_LOGS[name], "--json")
     assert code == 0, err
     assert "looks touched" not in err
     # what is printed as a threshold of the wrench is no wider than it is high
@@ -365,14 +370,6 @@ def test_real_free_logs_are_accepted(name: str, logs: Path, run) -> None:
         if (level := row[f"threshold_{unit}"]) is not None:
             low, high = row[f"interval_{unit}"]
             assert high - low <= level
-
-
-@pytest.mark.parametrize("name", ["salerno_ur10/ur10_exciting.db3", "ur3/identification.bag"])
-def test_free_logs_of_other_arms_are_accepted(name: str, logs: Path, run) -> None:
-    arm = ("ur3", "-tau") if name.startswith("ur3") else ("ur10", "tau=effort")
-    words = ("--robot", arm[0], f"--columns={arm[1]}", "--json")
-    code, _, err = run("thresholds", logs / name, *words)
-    assert code == 0, err
 
 
 @pytest.mark.parametrize("name", ["ur10e/push_pose.csv", "ur10e_planted/planted_12harm.csv.gz"])

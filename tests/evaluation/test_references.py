@@ -92,36 +92,20 @@ def test_zero_is_zero_and_vendor_is_the_log_s_own() -> None:
     assert vendor.floor is None  # its error is not known
 
 
-def test_a_file_is_read_once_for_torque_and_wrench(tmp_path, monkeypatch) -> None:
+def test_a_file_is_read_once_and_its_torques_go_before_its_wrench(tmp_path, monkeypatch) -> None:
     reads = []
     counted = partial(lambda *a: reads.append(a) or read_reference(*a))
     monkeypatch.setattr(references, "read_reference", counted)
-    choice = write(tmp_path / "truth.parquet", wrench=WRENCH)
-    reference = make_reference(MOTION, choice)
-    wrench = reference_wrench(RECORDING, ROBOT, reference, VirtualSensor(frame="base"))
-    assert len(reads) == 1
-    # A file of base axes, asked for in base axes, comes back as it is.
-    np.testing.assert_allclose(wrench.values, WRENCH, atol=1e-9)
-
-
-def test_torques_of_a_file_go_before_its_wrench(tmp_path) -> None:
     tau = RNG.standard_normal((300, 6))
     choice = write(tmp_path / "truth.parquet", wrench=WRENCH, tau_ext=tau)
     reference = make_reference(MOTION, choice)
+    wrench = reference_wrench(RECORDING, ROBOT, reference, VirtualSensor(frame="base"))
+    assert len(reads) == 1
     np.testing.assert_allclose(reference.torque.tau, tau, atol=1e-12)
-    assert reference.wrench is not None
-    remark = reference.torque.remarks[0]
-    assert remark.values["covered"] == remark.values["samples"] == 300
-
-
-def test_samples_beyond_the_file_are_unknown_half_a_sample_allowed(tmp_path) -> None:
-    """The file begins 4 ms after the log's 50th sample: half of the 10 ms step covers it."""
-    t = T[50:200] + 0.004
-    choice = write(tmp_path / "truth.parquet", t, tau_ext=np.repeat(t[:, None], 6, axis=1))
-    tau = make_reference(MOTION, choice).torque.tau
-    known = np.isfinite(tau).all(axis=1)
-    np.testing.assert_array_equal(np.flatnonzero(known), np.arange(50, 200))
-    np.testing.assert_allclose(tau[51:200, 0], T[51:200], atol=1e-12)  # linear between stamps
+    covered = reference.torque.remarks[0].values
+    assert covered["covered"] == covered["samples"] == 300
+    # A file of base axes, asked for in base axes, comes back as it is.
+    np.testing.assert_allclose(wrench.values, WRENCH, atol=1e-9)
 
 
 def test_a_file_of_another_arm_is_refused(tmp_path) -> None:

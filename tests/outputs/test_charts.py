@@ -16,20 +16,6 @@ def test_observers_keep_their_colours_and_others_get_ones_that_nobody_has() -> N
     assert found[names[0]] == found[names[-1]]  # there are no more
 
 
-def test_ends_hold_all_values() -> None:
-    def ends(*panels: list[float]) -> charts.Span:
-        values = np.array(panels).T
-        names, units = tuple(map(str, range(len(panels)))), ("N",) * len(panels)
-        line = charts.ChartLine("a", values)
-        return charts.Chart("k", "K", units, names, np.arange(len(values)), (line,)).ends(0)
-
-    found = ends([1.0, np.nan], [-3.0, np.nan])
-    assert found.low < -3.0
-    assert found.high > 1.0
-    assert ends([np.nan]) == ends([0.0, 0.0, 0.0]) == charts.Span(-1.0, 1.0)
-    assert ends([4.0, 4.0, 4.0]) == charts.Span(0.0, 8.0)
-
-
 def test_no_spike_is_lost_on_a_logarithmic_axis() -> None:
     t = np.linspace(1.0, 1000.0, 20_000)
     y = np.zeros_like(t)

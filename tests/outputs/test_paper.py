@@ -78,20 +78,6 @@ def test_files_have_their_names_and_long_names_are_cut() -> None:
     assert paper.shortened("a" * 60) == "a" * 43 + "…"
 
 
-def test_a_legend_takes_as_many_lines_as_it_needs() -> None:
-    """Seven names of five letters are .625 in each: five a line of 3.5 in, so four and three."""
-    from matplotlib.lines import Line2D
-
-    names = {f"abcd{k}": Line2D([], []) for k in range(7)}
-    for width, columns, room in ((3.5, 4, 0.35), (7.16, 7, 0.2)):
-        figure, _ = paper.sheet(width, 1, 1, 1.0)
-        bare = figure.get_figheight()
-        assert figure.legends == []
-        paper.add_legend(figure, names)
-        assert figure.legends[0]._ncols == columns  # it has no public name
-        assert figure.get_figheight() - bare == pytest.approx(room)
-
-
 T = np.linspace(0.0, 10.0, 4001)
 
 
