@@ -181,7 +181,7 @@ CASES: dict[str, tuple[Callable[[Path], Path], str, str]] = {
     "time backwards": (lambda d: changed(d, SOME, 0, "0.5"), COLUMNS, "backwards"),
     "one sample": (lambda d: saved(d / "log.csv", table(rows=1)), COLUMNS, "samples is 1"),
     "letters in a number": (lambda d: changed(d, SOME, 3, "abc"), COLUMNS, ""),
-    "binary noise": (noise, COLUMNS, ""),
+    "binary noise": (noise, COLUMNS, "a binary file of no kind that is known"),
     "blank lines": (lambda d: saved(d / "log.csv", [[""]] * 3), COLUMNS, "a text of blank lines"),
 }  # fmt: skip
 

@@ -69,6 +69,9 @@ def test_a_link_is_written_through_and_a_device_straight(tmp_path: Path) -> None
 def test_a_failing_folder_leaves_what_was_there(tmp_path: Path) -> None:
     with pytest.raises(KeyboardInterrupt), OutputFolder(tmp_path / "new" / "out") as folder:
         cut_short(folder / "a.txt")
+    full = OutputFolder(tmp_path / "new")
+    with pytest.raises(OutputError, match="no space left on device"), full:
+        raise OSError(28, "No space left on device")
     assert texts(tmp_path) == {}
     (tmp_path / "mine.txt").write_text("mine")
     (tmp_path / "a.txt").write_text("old")
