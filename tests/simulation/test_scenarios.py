@@ -9,13 +9,13 @@ import pytest
 
 from vftcli.robots import load_robot
 from vftcli.signals.errors import ParameterError, VftError
-from vftcli.simulation import load_scenario, scenario, scenario_names, simulate, trajectories
+from vftcli.simulation import SCENARIOS, load_scenario, scenario, simulate, trajectories
 from vftcli.simulation.experiment import simulate_pair
 from vftcli.simulation.scenario import Scenario, section_from, to_toml
 from vftcli.simulation.trajectories import plan
 
 
-@pytest.mark.parametrize("name", scenario_names())
+@pytest.mark.parametrize("name", SCENARIOS)
 def test_scenario_runs_and_its_file_makes_it_again(name: str, tmp_path: Path) -> None:
     scenario = load_scenario(name, ["duration=0.2"])
     run = simulate(scenario)
@@ -26,7 +26,7 @@ def test_scenario_runs_and_its_file_makes_it_again(name: str, tmp_path: Path) ->
     assert load_scenario(path) == scenario
 
 
-@pytest.mark.parametrize("name", scenario_names())
+@pytest.mark.parametrize("name", SCENARIOS())
 def test_scenario_stays_inside_the_limits_of_its_arm(name: str) -> None:
     scenario = load_scenario(name)
     robot = load_robot(scenario.robot)

@@ -17,6 +17,7 @@ from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from functools import cache
 from itertools import chain, count, islice
+from multiprocessing import resource_tracker
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, NamedTuple, TypeVar
 
@@ -50,7 +51,6 @@ CONFIG: Mapping[str, object] = {
     "distributed.worker.memory.spill": False,
     "distributed.comm.timeouts.connect": f"{ANSWER:g}s",
     "distributed.nanny.pre-spawn-environ": THREADS,
-    "distributed.worker.preload": [__name__],
 }
 
 #: Packages that make the numbers, or write them.
@@ -124,9 +124,21 @@ def failure_of(error: BaseException) -> Failure:
     return Failure(_stage.get(), type(error).__name__, words)
 
 
-def dask_setup(_worker: object) -> None:
-    """Ignore Ctrl-C, sent to every process: the main one ends its workers."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+@contextmanager
+def without_interrupt() -> Iterator[None]:
+    """Hold back Ctrl-C for a block, and for good in the threads and workers that it starts.
+
+    A terminal sends it to every process, but the main one ends its workers.
+    """
+    if not hasattr(signal, "pthread_sigmask"):  # Windows
+        yield
+        return
+    resource_tracker.ensure_running()  # it lets Ctrl-C through again, once
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def run_tasks(
@@ -190,10 +202,9 @@ def local(choice: WorkersChoice, tell: Tell) -> Iterator["Client"]:
             "one log after the other"
         ) from None
     tell(f"{counted(workers, 'worker')} of {memory / 1e9:.1f} GB")
-    with (
-        closed_cluster(workers, memory, security, logging.CRITICAL + 1) as cluster,
-        Client(cluster, security=security) as client,
-    ):
+    with without_interrupt():
+        cluster = closed_cluster(workers, memory, security, logging.CRITICAL + 1)
+    with cluster, Client(cluster, security=security) as client:
         yield client
 
 

@@ -77,11 +77,11 @@ def show(text: str) -> None:
 
 
 def echo_top(text: str) -> None:
-    """Print a result to stdout; without --details as many lines as a screen has."""
-    from vftcli.outputs.screen import MOST_LINES
+    """Print a result to stdout; without --details as many lines as fit beside the words."""
+    from vftcli.outputs.screen import FILE_LINES, MOST_LINES
 
     lines = text.rstrip("\n").split("\n")
-    if (more := len(lines) - MOST_LINES + 1) > 1 and _level.get() < DETAILS:
+    if (more := len(lines) + FILE_LINES - MOST_LINES + 1) > 1 and _level.get() < DETAILS:
         lines[-more:] = [f"and {more} lines more: --details"]
     echo("\n".join(lines))
 

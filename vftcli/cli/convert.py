@@ -60,7 +60,15 @@ def convert_log(
 @opt.command()
 def simulate_log(
     *,
-    scenario: Annotated[str, Option("", "SCENARIO", "list, a scenario's name or a FILE.toml.")],
+    scenario: Annotated[
+        str,
+        Option(
+            "",
+            "SCENARIO",
+            "list, a scenario's name or a FILE.toml.",
+            completes=names_at("simulation:SCENARIOS"),
+        ),
+    ],
     seed: Annotated[int | None, opt.SEED],
     log_format: Annotated[
         str,
@@ -86,12 +94,12 @@ def simulate_log(
     from vftcli.outputs.conversion import log_folder, save
     from vftcli.robots import load_robot
     from vftcli.signals.packages import check_installed
-    from vftcli.simulation import load_scenario, scenario_names
+    from vftcli.simulation import SCENARIOS, load_scenario
     from vftcli.simulation.experiment import simulate_pair
     from vftcli.simulation.writers import usual_format
 
     if scenario == "list":
-        titles = {name: load_scenario(name).title for name in scenario_names()}
+        titles = {name: load_scenario(name).title for name in SCENARIOS}
         if json:
             say_json([], scenarios=titles)
         else:

@@ -15,7 +15,7 @@ ABOUT = "ours / print: our number over the paper's, median of an item's lines (l
 
 @opt.command(opt.Talk)
 def reproduce(
-    paper: Annotated[str, Option("", "PAPER", "Which: huang2025.")],
+    paper: Annotated[str, Option("", "huang2025", "Which paper.")],
     output: Annotated[Path | None, opt.OUT._replace(help="Write here; default: huang2025.vft.")],
     figures: opt.Figures,
     only: Annotated[

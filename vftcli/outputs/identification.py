@@ -60,9 +60,8 @@ BASE_COLUMNS = {
 RESIDUALS = "RMS of measured less modelled drive torque [N·m]; check: of a --check log"
 #: Below the identified numbers.
 LEGEND = (
-    "profile: the value in your --robot, – if its model has none; sd: standard "
-    "deviation; not determined: the log does not settle it; com: in flange axes. "
-    "More: docs/robots.md"
+    "profile: of your --robot, – if it has none; sd: standard deviation; not determined: "
+    "not settled by the log; com: in flange axes. More: docs/robots.md"
 )
 DOTS = 600  #: Samples drawn in a residual-over-velocity plot.
 

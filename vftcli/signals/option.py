@@ -28,7 +28,7 @@ LOG, ESTIMATE, COMPARE, WRENCH, WRITE, OUTPUT = GROUPS = (
 
 FILE = "file:"  #: Head of a value with a path, where others are names.
 #: A value in a metavar, as `svg`; numbers and paths are none.
-WORD = re.compile("[a-z][a-z-]+")
+WORD = re.compile("[a-z][a-z0-9-]+")
 
 
 def text_of(value: object, name: str) -> str:

@@ -2,9 +2,10 @@
 
 from vftcli.simulation.arm import Arm
 from vftcli.simulation.experiment import Simulation, Truth, observe, prepare, simulate
-from vftcli.simulation.scenario import Scenario, load_scenario, scenario_names
+from vftcli.simulation.scenario import SCENARIOS, Scenario, load_scenario
 
 __all__ = [
+    "SCENARIOS",
     "Arm",
     "Scenario",
     "Simulation",
@@ -12,6 +13,5 @@ __all__ = [
     "load_scenario",
     "observe",
     "prepare",
-    "scenario_names",
     "simulate",
 ]

@@ -23,6 +23,7 @@ from vftcli.signals.parsing import check_known, toml_file, toml_tables
 from vftcli.simulation.trajectories import HoldSpec, Spec, TrajectorySpec
 
 FOLDER = Path(__file__).parent / "scenarios"
+SCENARIOS = tuple(sorted(path.stem for path in FOLDER.glob("*.toml")))  #: Built-in names.
 Section = TypeVar("Section")
 #: Largest number of a scenario in any unit; clocks that count from 1970 begin below it.
 LARGEST = 1e10
@@ -231,11 +232,6 @@ class Scenario(Spec):
     sensing: SensingSpec = SensingSpec()  #: What the log sees.
 
 
-def scenario_names() -> tuple[str, ...]:
-    """Names of the built-in scenarios, in alphabetical order."""
-    return tuple(sorted(path.stem for path in FOLDER.glob("*.toml")))
-
-
 def load_scenario(name: str | Path, overrides: Sequence[str] = ()) -> Scenario:
     """A built-in scenario or a user's TOML file, with `key=value` overrides applied.
 
@@ -249,9 +245,7 @@ def load_scenario(name: str | Path, overrides: Sequence[str] = ()) -> Scenario:
     if not path.is_file():
         path = Path(name)
         if path.suffix.lower() != ".toml":
-            check_known(
-                str(name), scenario_names(), f"no FILE.toml and no scenario {str(name)!r}"
-            )
+            check_known(str(name), SCENARIOS, f"no FILE.toml and no scenario {str(name)!r}")
     table = toml_file(path, "a scenario")
     table.setdefault("name", path.stem)
     for override in overrides:
