@@ -18,6 +18,8 @@ from vftcli.signals.pose import exp_matrix, exp_quaternion, log_quaternion, quat
 PAUSE = 1.0  #: Drags of one axis that follow each other within this time are one. [s]
 #: Return time → share of the deviation at release inside which the axis has to stay.
 SHARES = {"return_10_s": 0.10, "return_2_s": 0.02}
+#: A release nearer to zero than this share of the largest deviation has no return. [1]
+RELEASED = 0.2
 
 
 class Phases(NamedTuple):
@@ -236,9 +238,10 @@ def overshoot(x: Array, drag: Drag) -> float | None:
 
 
 def recovery_of(x: Array, drag: Drag) -> Array:
-    """Deviations from a drag's release on; empty if they escape or start at zero."""
+    """Deviations from a drag's release on; empty if they escape or start near zero."""
     after = x[drag.release : drag.end]
-    return after if np.isfinite(after).all() and after[0] != 0.0 else after[:0]
+    least = RELEASED * abs(x[drag.begin : drag.end]).max(initial=0.0)
+    return after if np.isfinite(after).all() and abs(after[0]) > least else after[:0]
 
 
 def finite(value: float) -> float | None:

@@ -80,7 +80,7 @@ LEGEND = (
     "drag: number of the push along that axis; peak: its largest deviation; "
     "at: time since it began; to 10 %, to 2 %: time from its release until the "
     "deviation stays within that share of its value at release; –: not in this "
-    "log. α, ξ: docs/admittance.md"
+    "log, or released near zero. α, ξ: docs/admittance.md"
 )
 #: Meaning of headings in LaTeX.
 RETURNS = (
