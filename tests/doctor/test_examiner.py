@@ -55,10 +55,13 @@ def test_a_robot_is_loaded_once_and_guessed_where_the_makers_model_tells_it():
     assert "robot-guessed" in [remark.code for remark in guessed.remarks]
     with pytest.raises(RobotError, match=r"^Which arm\? Best fits: ur5e \(.* Add --robot ur5e$"):
         examiner.robot(log, RobotChoice())
-    with pytest.raises(
-        RobotError, match=r"^Which arm\? No profile fits; nearest is .* --robot FILE"
+    unlike = np.random.default_rng(1).normal(0.0, 30.0, log.q.shape)
+    for other, reason in (
+        (turned(log), ": the torque of .* has its sign turned .* a leading minus"),
+        (replace(log, torque=unlike), "; nearest is .* --robot FILE"),
     ):
-        examiner.robot(turned(log), RobotChoice())
+        with pytest.raises(RobotError, match=rf"^Which arm\? No profile fits{reason}"):
+            examiner.robot(other, RobotChoice())
     with pytest.raises(MissingSignalError, match="positions alone carry no force; it has q, dq"):
         examiner.robot(replace(log, torque=None), RobotChoice())
 

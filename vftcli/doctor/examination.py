@@ -251,6 +251,9 @@ def guessed(recording: Recording) -> tuple[str, tuple[Remark, ...]]:
             good = [f"--robot {fit.robot}" for fit in near if fit.fits]
             best = f"Best fits: {', '.join(fit.in_short for fit in near)}"
             none = f"No profile fits; nearest is {near[0].robot}. Give a URDF: --robot FILE"
+            wrong = () if good else examine(recording, in_stretches=True).refusals(fitting=False)
+            for cause in map(in_words, wrong[:1]):
+                none = f"No profile fits: {cause.evidence}. {cause.remedy}"
             words = f"{best}. Add {' or '.join(good)}" if good else none
         raise UnsettledRobotError(f"Which arm? {words}", recording)
     others = [fit.in_short for fit in fits[:3] if fit is not found]
