@@ -239,6 +239,7 @@ class Examiner:
 
 
 NEAREST = 2  #: Profiles in the error where none is settled.
+BRIEF = 0.5  #: A shorter log tells no arm from another. [s]
 
 
 def guessed(recording: Recording) -> tuple[str, tuple[Remark, ...]]:
@@ -247,6 +248,8 @@ def guessed(recording: Recording) -> tuple[str, tuple[Remark, ...]]:
     found, fits = guess_robot(recording)
     if found is None:
         near, words = fits[:NEAREST], choices_for(recording)
+        if recording.duration < BRIEF:
+            near = ()  # of so little motion any arm explains as much
         if near:
             good = [f"--robot {fit.robot}" for fit in near if fit.fits]
             best = f"Best fits: {', '.join(fit.in_short for fit in near)}"
