@@ -44,7 +44,7 @@ WRITING = "simulate admit identify convert inspect compare annotate batch reprod
 OWN = {
     ("simulate", "--set"), ("identify", "--gains"),
     *((command, "--output") for command in WRITING.split()),
-    *((command, "--csv") for command in ("report", "estimate", "compare", "contacts")),
+    *((command, "--csv") for command in ("report", "estimate", "compare", "contacts", "batch")),
 }  # fmt: skip
 """Options that are a command's own: --set of a scenario, the goal of --method gains, what is
 written where, and --csv, which the contract makes a file of `estimate` and a table of the others.

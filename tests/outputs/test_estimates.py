@@ -42,7 +42,7 @@ def test_unknown_is_null_or_no_column(analysis: Analysis, without_reference: Ana
 
 
 def test_csv_has_the_same_columns(analysis: Analysis, tmp_path: Path) -> None:
-    write_estimate_folder(tmp_path, analysis, "", OutputChoice(extras=("csv",)))
+    write_estimate_folder(tmp_path, analysis, "", OutputChoice(csv=True))
     table = pl.read_csv(tmp_path / "estimates.csv")
     assert {path.suffix for path in tmp_path.iterdir()} == {".csv", ".parquet", ".json"}
     assert table.columns == estimates_table(analysis).columns
@@ -56,7 +56,7 @@ def test_csv_has_the_same_columns(analysis: Analysis, tmp_path: Path) -> None:
     pytest.param("rrd", "recording.rrd", b"RRF2", marks=pytest.mark.slow),
 ])  # fmt: skip
 def test_an_extra_is_one_more_file_of_its_format(analysis, tmp_path, extra, name, begins):
-    write_estimate_folder(tmp_path, analysis, "", OutputChoice(extras=(extra,)))
+    write_estimate_folder(tmp_path, analysis, "", OutputChoice(**{extra: True}))
     assert {path.name for path in tmp_path.iterdir()} == {"estimates.parquet", "run.json", name}
     assert (tmp_path / name).read_bytes().startswith(begins)
 
@@ -94,7 +94,7 @@ def test_what_the_pose_hides_is_apart(analysis: Analysis) -> None:
 
 
 def test_a_log_in_blocks_gives_the_same_folder(analysis: Analysis, tmp_path: Path) -> None:
-    choice = OutputChoice(extras=("csv",))
+    choice = OutputChoice(csv=True)
     write_estimate_folder(tmp_path / "whole", analysis, "", choice)
     blocks = [slice(start, start + 250) for start in range(0, len(analysis.t), 250)]
     groups = ((analysis, rows) for rows in (None, *blocks))

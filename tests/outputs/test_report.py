@@ -27,7 +27,7 @@ def test_a_report_holds_its_files(analysis: Analysis, tmp_path: Path) -> None:
 
 
 def test_contacts_are_written_beside_an_mcap(touched: Analysis, tmp_path: Path) -> None:
-    choice = OutputChoice(extras=("mcap",))
+    choice = OutputChoice(mcap=True)
     write_report(tmp_path, [touched], command="", choice=choice)
     assert {p.name for p in tmp_path.iterdir()} == {*FILES, "estimates.mcap"}
     record = json.loads((tmp_path / "contacts.json").read_text(encoding="utf-8"))

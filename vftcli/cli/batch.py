@@ -19,7 +19,7 @@ WITHOUT_REFERENCE = ("estimate", "contacts")
 MOST_NAMED = 10  #: Failures that are printed.
 
 
-@opt.command(WorkersChoice, ReferenceChoice, *opt.OF_ANALYSIS, opt.Mcap, OutputChoice)
+@opt.command(WorkersChoice, ReferenceChoice, *opt.OF_ANALYSIS, OutputChoice)
 def batch(
     logs: Annotated[
         list[Path],
@@ -80,7 +80,7 @@ def batch(
         )
     run = BatchRun(
         logs=found,
-        job=LogJob(do=do, choice=choice, anyway=anyway, written=opt.outputs_of(asked)),
+        job=LogJob(do=do, choice=choice, anyway=anyway, written=asked.of(OutputChoice)),
         folder=BatchFolder(absolute(output)),
         workers=engine,
         command=asked.line,

@@ -125,12 +125,12 @@ def open_made(path: Path) -> None:
 
 def canvas() -> "Canvas":
     """Abilities of stdout: width, letters, colour."""
-    from vftcli.outputs.screen import Canvas
+    from vftcli.outputs.screen import NARROWEST, WIDEST, Canvas
 
     stream = sys.stdout
     letters = (getattr(stream, "encoding", None) or "utf-8").lower()
-    return Canvas.of(
-        columns=shutil.get_terminal_size().columns,
+    return Canvas(
+        width=min(max(shutil.get_terminal_size().columns, NARROWEST), WIDEST),
         unicode=letters.startswith("utf"),
         colour=is_terminal(stream) and not os.environ.get("NO_COLOR"),
     )

@@ -11,7 +11,6 @@ import inspect
 import os
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
 from types import NoneType
 from typing import TYPE_CHECKING, Annotated, Any, get_args, get_origin
@@ -23,7 +22,6 @@ from vftcli.cli.config import READ
 from vftcli.cli.console import command_line, health_of, speaking
 from vftcli.free_motion import FreeChoice
 from vftcli.observers import ObserverChoice
-from vftcli.outputs import OutputChoice
 from vftcli.readers.reader import ReadChoice
 from vftcli.robots import RobotChoice
 from vftcli.signals.errors import ParameterError
@@ -120,14 +118,6 @@ class Talk(Choice):
 
     details: Annotated[bool, Option("-v/--details", "", "Show everything that is known.")]
     quiet: Annotated[bool, Option("-q/--quiet", "", "Print errors and results only.")]
-
-
-class Mcap(Choice):
-    """Whether estimates are written for ROS 2 too."""
-
-    GROUP = WRITE
-
-    mcap: Annotated[bool, Option("--mcap", "", "Also write estimates.mcap (ROS 2, Foxglove).")]
 
 
 class TableForm(Choice):
@@ -302,9 +292,3 @@ def choice_for(
         give_back()
     examiner = health_of(library, anyway=asked.anyway, on_screen=on_screen)
     return choice_of(asked, library, examiner, observers)
-
-
-def outputs_of(asked: Asked) -> OutputChoice:
-    """Outputs for other programs."""
-    extras = tuple(name for name in ("csv", "rrd", "mcap") if asked.words.get(name))
-    return replace(asked.of(OutputChoice), extras=extras)

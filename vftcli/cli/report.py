@@ -24,15 +24,7 @@ class PrintChoice(Choice):
     ] = None
 
 
-class Csv(Choice):
-    """Whether estimates are written for spreadsheets too."""
-
-    GROUP = WRITE
-
-    csv: Annotated[bool, Option("--csv", "", "Also write estimates.csv.")]
-
-
-@opt.command(ReferenceChoice, *opt.OF_ANALYSIS, opt.Mcap, Csv, OutputChoice, PrintChoice)
+@opt.command(ReferenceChoice, *opt.OF_ANALYSIS, OutputChoice, PrintChoice)
 def report(
     logs: opt.Logs,
     output: opt.LogFolder,
@@ -54,7 +46,7 @@ def report(
     from vftcli.pipeline import WRITING, analyse_logs, sense
     from vftcli.readers.reading import Library
 
-    library, written = Library(logs), opt.outputs_of(asked)
+    library, written = Library(logs), asked.of(OutputChoice)
     output, details = opt.folder_of(output, logs, asked), asked.words["details"]
     published = asked.of(PrintChoice).table
     names = report_files(map(library.label, logs), written.extras, figures, several=len(logs) > 1)
@@ -131,7 +123,7 @@ def show_answers(
             show(terminal(print_grid(made.published)) + "".join(remarks))
 
 
-@opt.command(*opt.OF_ANALYSIS, opt.Mcap, Csv, OutputChoice)
+@opt.command(*opt.OF_ANALYSIS, OutputChoice)
 def estimate(
     log: opt.Log,
     output: opt.LogFolder,
@@ -157,7 +149,7 @@ def estimate(
     from vftcli.signals.recording import EXAMINED
 
     output, library = opt.folder_of(output, [log], asked), Library([log])
-    written = opt.outputs_of(asked.but(rrd=rrd or show))
+    written = replace(asked.of(OutputChoice), rrd=rrd or show)
     names = estimate_files(written.extras)
     if "rrd" in written.extras:
         check_installed("rerun", "recording.rrd (--rrd, --open)")

@@ -247,17 +247,17 @@ def guessed(recording: Recording) -> tuple[str, tuple[Remark, ...]]:
     check_effort(recording)  # no arm would help
     found, fits = guess_robot(recording)
     if found is None:
-        near, words = fits[:NEAREST], choices_for(recording)
-        if recording.duration < BRIEF:
-            near = ()  # of so little motion any arm explains as much
+        near = fits[:NEAREST] if recording.duration > BRIEF else ()
+        words = choices_for(recording)
         if near:
             good = [f"--robot {fit.robot}" for fit in near if fit.fits]
-            best = f"Best fits: {', '.join(fit.in_short for fit in near)}"
-            none = f"No profile fits; nearest is {near[0].robot}. Give a URDF: --robot FILE"
-            wrong = () if good else examine(recording, in_stretches=True).refusals(fitting=False)
-            for cause in map(in_words, wrong[:1]):
-                none = f"No profile fits: {cause.evidence}. {cause.remedy}"
-            words = f"{best}. Add {' or '.join(good)}" if good else none
+            words = f"No profile fits; nearest is {near[0].robot}. Give a URDF: --robot FILE"
+            if good:
+                best = ", ".join(fit.in_short for fit in near)
+                words = f"Best fits: {best}. Add {' or '.join(good)}"
+            elif wrong := examine(recording, in_stretches=True).refusals(fitting=False):
+                cause = in_words(wrong[0])
+                words = f"No profile fits: {cause.evidence}. {cause.remedy}"
         raise UnsettledRobotError(f"Which arm? {words}", recording)
     others = [fit.in_short for fit in fits[:3] if fit is not found]
     remark = fact("robot-guessed", robot=found.robot, fit=str(found), others=others or ["none"])

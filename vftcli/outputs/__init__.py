@@ -19,7 +19,11 @@ class OutputChoice(Choice):
 
     GROUP = WRITE
 
-    extras: tuple[str, ...] = ()  #: Names of `estimates.EXTRAS`.
+    mcap: Annotated[
+        bool, Option("--mcap", "", "Also write estimates.mcap (ROS 2, Foxglove).")
+    ] = False
+    csv: Annotated[bool, Option("--csv", "", "Also write estimates.csv.")] = False
+    rrd: bool = False  #: Whether `estimate` writes a recording.
     #: The recording's part of the log: `FULL`, `LEVELS` or `NONE`.
     detail: Annotated[
         str,
@@ -36,10 +40,15 @@ class OutputChoice(Choice):
             raise ParameterError(
                 f"--set recording.detail={self.detail} is none of {FULL}, {LEVELS} and {NONE}"
             )
-        if self.detail == NONE and "rrd" in self.extras:
+        if self.detail == NONE and self.rrd:
             raise ParameterError(
                 "recording.detail=none writes no recording; leave it or --rrd out"
             )
+
+    @property
+    def extras(self) -> tuple[str, ...]:
+        """Names of `estimates.EXTRAS` that are written."""
+        return tuple(name for name in ("csv", "rrd", "mcap") if getattr(self, name))
 
 
 PLAIN = OutputChoice()

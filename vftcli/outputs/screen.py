@@ -7,7 +7,7 @@ written: forty lines at most.
 import textwrap
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple, Self
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -66,7 +66,7 @@ SUBJECT = 17  #: Columns of a ground's subject.
 #: Codes of remarks that others run on the paper's gains.
 MEASURED = ("paper-gains-measured", "paper-gains-measured-level")
 
-NARROWEST, WIDEST = 72, 100  #: Least and most columns of a screen.
+NARROWEST, WIDEST = 40, 100  #: Least and most columns of a screen.
 ROWS = 3  #: Lines of the bars.
 #: Letters of a bar, from empty to full.
 STEPS, ASCII_STEPS = " ▁▂▃▄▅▆▇█", " .-=#"
@@ -87,11 +87,6 @@ class Canvas(NamedTuple):
     width: int = 80  #: Columns that are used.
     unicode: bool = True  #: Whether it has more letters than ASCII.
     colour: bool = False
-
-    @classmethod
-    def of(cls, *, columns: int, unicode: bool, colour: bool) -> Self:
-        """The canvas of a terminal with so many columns."""
-        return cls(min(max(columns, NARROWEST), WIDEST), unicode, colour)
 
     def painted(self, text: str, style: str) -> str:
         """A text in a style, unchanged without colours."""
