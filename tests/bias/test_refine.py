@@ -8,7 +8,7 @@ import polars as pl
 import pytest
 from sound_logs import UR10E
 
-from vftcli.bias import AUTOMATIC, REMOVALS, RefinementChoice
+from vftcli.bias import AUTOMATIC, RefinementChoice
 from vftcli.bias.baseline import Baseline, Baselines, baseline_of, free_reading
 from vftcli.bias.refine import STICTION, band_remarks, friction_share, limits_remark, with_band
 from vftcli.bias.whole_log import WholeLogBias, stride_of
@@ -193,4 +193,4 @@ def test_the_whole_log_s_bias_comes_off_for_everyone_if_asked_for():
     corrects = {word: asked.corrects_all for word, asked in words.items()}
     assert corrects == {"auto": False, "whole-log": True, "none": False}
     with pytest.raises(ParameterError, match="there is auto, whole-log, none"):
-        RefinementChoice(bias="all")
+        RefinementChoice.parsed(settings={"bias.method": "all"})

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from vftcli.bias.baseline import Baseline, baseline_of, free_reading
-from vftcli.free_motion import ALIGNMENTS, FreeChoice, cutoff, cycle_numbers
+from vftcli.free_motion import FreeChoice, cutoff, cycle_numbers
 from vftcli.free_motion.difference import RUNGS
 from vftcli.free_motion.free_motion import (
     FreeLoad,
@@ -323,4 +323,4 @@ def test_lists_of_cycles_cutoffs_and_names_of_rungs():
         with pytest.raises(ReferenceTorqueError, match="free-cycles"):
             cycle_numbers(text)
     assert (cutoff("auto"), cutoff("none"), cutoff("12")) == ("auto", None, 12.0)
-    assert tuple(RUNGS) == ALIGNMENTS
+    assert ["auto", *RUNGS] == FreeChoice.option("two-cycle.alignment").values()

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 from vftcli.robots import PROFILES, RobotChoice, load_robot
 from vftcli.signals.errors import ParameterError, RobotError
 from vftcli.signals.option import FILE, NUMBERS, Choice, Option, names_at, numbers
-from vftcli.signals.parsing import check_known
 
 if TYPE_CHECKING:
     from vftcli.admittance.law import Controller
@@ -40,7 +39,7 @@ class ControlChoice(Choice):
             lambda text: listed(text, "--alpha"),
         ),
     ] = ()
-    #: One of `vftcli.admittance.law.KINDS`, None for both.
+    #: None for both.
     kind: Annotated[
         str | None,
         Option("admittance.controller", "variable|traditional", "Run one only."),
@@ -84,10 +83,6 @@ class ControlChoice(Choice):
     as_printed: bool = False  #: Whether the paper's printed formulas run.
 
     def __post_init__(self) -> None:
-        from vftcli.admittance.law import KINDS
-
-        if self.kind is not None:
-            check_known(self.kind, KINDS, f"no controller {self.kind!r}")
         if self.force is not None and self.force != "sensor" and not self.force.startswith(FILE):
             raise ParameterError(
                 f"admittance.force={self.force} is neither sensor nor {FILE}PATH"

@@ -44,7 +44,6 @@ MAY_BE_ZERO = ("damping", "threshold", "hysteresis")
 MAY_BE_ENDLESS = ("threshold", "speed_limit")
 #: Keys of ``[admittance]`` that are not one number an axis.
 PLAIN = ("period", "threshold_mode", "source", "start", "confidence")
-KINDS = ("traditional", "variable")
 #: 2TsB/M + Ts²K/M below it: both roots of det(zI − A) in |z| = 1.
 DISCRETE_BOUND = 4.0
 UNITS = ("m", "m", "m", "rad", "rad", "rad")

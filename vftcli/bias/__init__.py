@@ -6,13 +6,11 @@ Here is the user's choice: bias subtracted, contacts listed or not.
 from typing import Annotated
 
 from vftcli.signals.option import ESTIMATE, Choice, Option, is_yes
-from vftcli.signals.parsing import check_known
 
 #: What the log allows: a bias for `best`, none for others.
 AUTOMATIC = "auto"
 #: The word for the bias fitted to the whole log and subtracted before observers run.
 WHOLE_LOG = "whole-log"
-REMOVALS = (AUTOMATIC, WHOLE_LOG, "none")  #: What ``bias.method`` takes.
 
 
 class RefinementChoice(Choice):
@@ -24,16 +22,13 @@ class RefinementChoice(Choice):
         str,
         Option(
             "bias.method",
-            "|".join(REMOVALS),
+            f"{AUTOMATIC}|{WHOLE_LOG}|none",
             "Whether to subtract the fitted model error; auto: from best only.",
         ),
     ] = AUTOMATIC
     contacts: Annotated[
         bool, Option("contacts.list", "yes|no", "Whether to list contacts.", is_yes)
     ] = True
-
-    def __post_init__(self) -> None:
-        check_known(self.bias, REMOVALS, f"--set bias.method={self.bias}")
 
     @property
     def corrects_all(self) -> bool:

@@ -13,8 +13,6 @@ from vftcli.signals.errors import ParameterError, ReferenceTorqueError
 from vftcli.signals.option import LOG, Choice, Option, interval
 
 AUTOMATIC = "auto"  #: The word for what is chosen by the log at hand.
-#: Ways to align, lowest first: `vftcli.free_motion.difference.RUNGS`.
-ALIGNMENTS = ("commanded", "period", "phase", "model")
 
 
 SPAN = re.compile(r"[-+.\d]*:[-+.\d]*")  #: Two times with a colon, in any order.
@@ -103,10 +101,6 @@ class FreeChoice(Choice):
     ] = AUTOMATIC
 
     def __post_init__(self) -> None:
-        if self.alignment not in {AUTOMATIC, *ALIGNMENTS}:
-            raise ReferenceTorqueError(
-                f"no alignment {self.alignment!r}; there is auto, {', '.join(ALIGNMENTS)}"
-            )
         if self.period is not None and not self.period > 0.0:
             raise ReferenceTorqueError(
                 f"two-cycle.period={self.period:g} is not a positive time in seconds"

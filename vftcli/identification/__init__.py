@@ -7,19 +7,19 @@ from typing import Annotated
 
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.option import Choice, Option, interval, is_yes
-from vftcli.signals.parsing import check_known
-
-#: Values of ``--method``; the gains of observers are `vftcli.observers.tuning`'s.
-METHODS = ("friction", "base", "targets", "payload", "gains")
 
 
 class Task(Choice):
     """Method and settings of an identification."""
 
-    #: Of `METHODS`; None: friction, or base without the arm's own links.
+    #: None: friction, or base without the arm's own links; gains are `observers.tuning`'s.
     method: Annotated[
         str | None,
-        Option("--method", "|".join(METHODS), "Fit friction, base, targets, payload or gains."),
+        Option(
+            "--method",
+            "friction|base|targets|payload|gains",
+            "Fit friction, base, targets, payload or gains.",
+        ),
     ] = None
     #: End of the used band. [Hz]
     cutoff: Annotated[
@@ -44,8 +44,6 @@ class Task(Choice):
     def __post_init__(self) -> None:
         if not 0.0 < self.cutoff < 1e4:
             raise ParameterError(f"cutoff is {self.cutoff:g} Hz; it must be positive")
-        if self.method is not None:
-            check_known(self.method, METHODS, f"--method {self.method}")
         if self.constants and self.method not in {None, "friction"}:
             raise ParameterError("--set identify.constants=yes is for --method friction")
         if self.method == "targets" and not self.friction:

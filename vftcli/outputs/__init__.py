@@ -36,10 +36,6 @@ class OutputChoice(Choice):
     ] = LEVELS
 
     def __post_init__(self) -> None:
-        if self.detail not in (FULL, LEVELS, NONE):
-            raise ParameterError(
-                f"--set recording.detail={self.detail} is none of {FULL}, {LEVELS} and {NONE}"
-            )
         if self.detail == NONE and self.rrd:
             raise ParameterError(
                 "recording.detail=none writes no recording; leave it or --rrd out"

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Annotated
 from vftcli.signals.errors import LogError, ParameterError
 from vftcli.signals.option import LOG, Choice, Option
 from vftcli.signals.option import interval as read_interval
-from vftcli.signals.parsing import check_known
 
 if TYPE_CHECKING:
     from vftcli.readers.columns import ColumnSpec
@@ -76,11 +75,7 @@ def episode_number(text: str) -> int:
 
 
 class ReadChoice(Choice):
-    """How a log is read, and which part of it is used.
-
-    Raises:
-        ParameterError: If the effort, the derived signal or the arm is none of these.
-    """
+    """How a log is read, and which part of it is used."""
 
     GROUP = LOG
 
@@ -138,12 +133,6 @@ class ReadChoice(Choice):
     examining: bool = False
     #: Whether rows with a value that is no number are left out and said, not refused.
     skips_unknown: bool = False
-
-    def __post_init__(self) -> None:
-        for name, _, option in self.options().values():
-            word = getattr(self, name)
-            if name in {"arm", "derive", "effort"} and word is not None:
-                check_known(word, option.values(), f"{option.typed} {word!r}")
 
     @property
     def spec(self) -> "ColumnSpec":

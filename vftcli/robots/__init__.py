@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 from vftcli.signals.errors import RobotError
 from vftcli.signals.option import LOG, Choice, Option
 from vftcli.signals.packages import door
-from vftcli.signals.parsing import check_known, did_you_mean
+from vftcli.signals.parsing import did_you_mean
 
 if TYPE_CHECKING:
     from vftcli.robots.chain import Chain, Payload
@@ -99,8 +99,6 @@ def load_robot(robot: "str | Path | Robot", *, tip: str = "") -> "Robot":
     )
 
 
-#: Values of ``model.friction``: the robot file's, none at all, or that of a simulator.
-FRICTION = ("profile", "none", "model")
 DECLARED = "log"  #: Value of ``--payload``: what the controller knows of, as the log says.
 
 
@@ -132,9 +130,6 @@ class RobotChoice(Choice):
         Option("--payload", "NAME", "Mount this payload of the robot file."),
     ] = None
     tip: Annotated[str, Option("--tip", "FRAME", "End the arm at this link or joint.")] = ""
-
-    def __post_init__(self) -> None:
-        check_known(self.friction, FRICTION, f"--set model.friction={self.friction}")
 
     def load(self, recording: "Recording", otherwise: str | None = None) -> "Robot":
         """Load the robot chosen, or that the log says, or `otherwise`."""

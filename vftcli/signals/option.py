@@ -18,7 +18,7 @@ from types import MappingProxyType, NoneType
 from typing import Annotated, Any, ClassVar, NamedTuple, Self, TypeVar, get_args
 
 from vftcli.signals.errors import ParameterError
-from vftcli.signals.parsing import did_you_mean
+from vftcli.signals.parsing import check_known, did_you_mean
 
 #: Headings of the options that commands share, in their order.
 LOG, ESTIMATE, COMPARE, WRENCH, WRITE, OUTPUT = GROUPS = (
@@ -71,7 +71,15 @@ class Option(NamedTuple):
         return [word for word in self.metavar.split("|") if WORD.fullmatch(word)]
 
     def read(self, typed: Any) -> Any:  # noqa: ANN401 - texts, numbers, lists of them
-        """The value of a typed text, None if nothing was typed."""
+        """The value of a typed text, None if nothing was typed.
+
+        Raises:
+            ParameterError: If `metavar` lists words, and it is none of them.
+        """
+        words = self.metavar.split("|")
+        if isinstance(typed, str) and words[1:] and all(map(WORD.fullmatch, words)):
+            head = f"--set {self.name}=" if self.is_setting else f"{self.typed} "
+            check_known(typed, words, f"{head}{typed}")
         return self.reads(typed) if self.reads and typed is not None else typed
 
     def keyword(self, value: object, log: type = NoneType) -> object:
@@ -126,8 +134,6 @@ def names_at(place: str) -> Callable[[], Iterable[str]]:
 
 def is_yes(text: str) -> bool:
     """Whether a setting's text, yes or no, is yes."""
-    if text not in {"yes", "no"}:
-        raise ParameterError(f"{text!r} is neither yes nor no")
     return text == "yes"
 
 

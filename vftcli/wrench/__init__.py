@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Annotated
 
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.option import WRENCH, Choice, Option, interval, names_at
-from vftcli.signals.parsing import check_known
 
 if TYPE_CHECKING:
     from vftcli.robots.robot import Robot
@@ -126,12 +125,9 @@ class WrenchChoice(Choice):
     ] = None
 
     def __post_init__(self) -> None:
-        from vftcli.wrench.solvers import SOLVERS, check_frame
+        from vftcli.wrench.solvers import check_frame
 
         check_frame(self.frame)
-        if self.solver is not None:
-            there = (SMOOTHER, *SOLVERS)
-            check_known(self.solver, there, f"no solver {self.solver!r} for a wrench")
 
     @property
     def by_pose(self) -> str:
