@@ -244,12 +244,12 @@ def test_a_file_fits_a_few_screens() -> None:
 
 
 MOST = {
-    "lines of Python": 50_690,
+    "lines of Python": 50_648,
     "files": 210,
-    "functions": 2705,
+    "functions": 2700,
     "functions over 60 lines": 8,
-    "names, operators, numbers": 364_000,
-    "characters a line that is not blank": 50.11,
+    "names, operators, numbers": 363_752,
+    "characters a line that is not blank": 50.10,
     "noqa": 70,
     "lines of TOML, JavaScript, CSS": 7258,
 }

@@ -380,7 +380,7 @@ def test_a_release_starts_where_it_is_set_or_where_the_file_says():
 def test_a_slip_is_refused_before_a_log_is_read():
     with pytest.raises(ParameterError, match="--alpha 'one' is not a list of numbers"):
         ControlChoice.parsed(alpha="one")
-    with pytest.raises(ParameterError, match="there is traditional, variable"):
+    with pytest.raises(ParameterError, match="there is variable, traditional"):
         ControlChoice.parsed(settings={"admittance.controller": "fuzzy"})
 
 

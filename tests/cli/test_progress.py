@@ -246,7 +246,7 @@ def test_a_result_is_one_screen_without_details(capsys) -> None:
     text = "".join(f"{k}\n" for k in range(50))
     echo_top(text)
     *_, last, more = capsys.readouterr().out.splitlines()
-    assert (last, more) == ("38", "and 11 lines more: --details")
+    assert (last, more) == ("34", "and 15 lines more: --details")
     with speaking(details=True, quiet=False):
         echo_top(text)
     assert capsys.readouterr().out == text

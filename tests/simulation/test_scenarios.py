@@ -26,7 +26,7 @@ def test_scenario_runs_and_its_file_makes_it_again(name: str, tmp_path: Path) ->
     assert load_scenario(path) == scenario
 
 
-@pytest.mark.parametrize("name", SCENARIOS())
+@pytest.mark.parametrize("name", SCENARIOS)
 def test_scenario_stays_inside_the_limits_of_its_arm(name: str) -> None:
     scenario = load_scenario(name)
     robot = load_robot(scenario.robot)
