@@ -116,7 +116,7 @@ def test_logs_behind_two_dashes_stay_behind_them(run, here: Path) -> None:
     ("free = [[1, 2]]", "is not a text, a number or a list of them"),
     ('wrench = "yes"', "wrench = 'yes' is neither true nor false"),
     ('[two-cycle]\nperiod = "long"', "two-cycle.period=long is not a number"),
-    ('[two-cycle]\nalignment = "odd"', "no alignment 'odd'"),
+    ('[two-cycle]\nalignment = "odd"', "two-cycle.alignment=odd; there is auto"),
     ("two-cycle = 4", "'two-cycle' is no option of a command that reads a log"),
     ('robot = "mine.toml"', f"{Path('sub/mine.toml')}: no such robot file"),
 ])  # fmt: skip

@@ -75,9 +75,9 @@ BAD = {
     "virtual-sensor.sensor": ("hand", "virtual-sensor.sensor"),
     "--zero": ("nowhere", "is neither A:B with A < B, in seconds, nor start; name a log"),
     "virtual-sensor.torque-sd": ("some", "virtual-sensor.torque-sd"),
-    "log.derive": ("tau", "log.derive 'tau'"),
+    "log.derive": ("tau", "there is dq, none"),
     "--reference": ("magic", "no reference 'magic'; there is zero, vendor, two-cycle, sensor"),
-    "--figures": ("gif", "--figures 'gif' is not pdf, svg or png"),
+    "--figures": ("gif", "--figures gif; there is pdf, svg, png"),
     "--config": ("nowhere.toml", "--config nowhere.toml: no such file"),
 }
 """Shared option or setting → a value it does not take, and what the one line on it says."""
