@@ -24,6 +24,18 @@ def run(monkeypatch, capsys):
 
 
 @pytest.fixture
+def ran(run):
+    """Run a command that has to work; return its stdout and stderr."""
+
+    def call(*words: object) -> tuple[str, str]:
+        code, out, err = run(*words)
+        assert code == 0, err
+        return out, err
+
+    return call
+
+
+@pytest.fixture
 def refused(run):
     """Run a command that is to fail; return its error, the one line but for notes."""
 

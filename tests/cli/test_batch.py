@@ -138,7 +138,9 @@ def test_free_motion_among_the_logs_is_none_of_them(run, folder: Path, tmp_path:
     assert (code, err.splitlines()[-1].split(":")[0]) == (0, "2 logs")
 
 
-def test_what_describes_logs_is_passed_over_and_said_once(run, folder, tmp_path: Path) -> None:
+def test_what_describes_logs_is_passed_over_and_said_once(
+    run, ran, folder, tmp_path: Path
+) -> None:
     described = folder / "a" / "meta.json"
     described.write_text('{"operator": "x", "gains": [1, 2, 3]}')
     for name in ("b/meta.json", "meta.json", "more.json"):
@@ -147,8 +149,7 @@ def test_what_describes_logs_is_passed_over_and_said_once(run, folder, tmp_path:
     names = "log.csv.scenario.toml, meta.json, meta.json and 2 more"
     for place, said in ((folder, f"left out, not a log: {names}"),
                         (folder / "b", "left out, not a log: meta.json")):  # fmt: skip
-        code, _, err = run("batch", place, *HERE, "-o", tmp_path / f"{place.name}-out")
-        assert code == 0
+        err = ran("batch", place, *HERE, "-o", tmp_path / f"{place.name}-out")[1]
         assert err.count("not logs") + err.count("not a log") == 1
         assert f"note: {said}\n" in err
     _, _, err = run("batch", described, *HERE, "-o", tmp_path / "named")

@@ -67,7 +67,7 @@ def check_colours(page: str) -> None:
 
 
 @pytest.mark.slow
-def test_rivals_are_rows_and_copies_score_alike(run, manifest: Path, tmp_path: Path) -> None:
+def test_rivals_are_rows_and_copies_score_alike(run, ran, manifest: Path, tmp_path: Path) -> None:
     """A copy of gmo, the truth, nothing, and the truth 50 ms late."""
     truth = pl.read_parquet(FIXTURES / "ur5_circle.csv.truth.parquet")
     t = since_start(truth["t"].to_numpy(), Library().open(CIRCLE))
@@ -91,8 +91,7 @@ def test_rivals_are_rows_and_copies_score_alike(run, manifest: Path, tmp_path: P
         (tmp_path / name).mkdir()
         table.write_csv(tmp_path / name / "circle.csv")
         words += ["--outside", f"{name}={tmp_path / name}"]
-    code, out, err = run(*asked(manifest, *words, "--json"))
-    assert code == 0, err
+    out = ran(*asked(manifest, *words, "--json"))[0]
     rows = {(r["method"], r["part"]): r for r in json.loads(out)["rows"]}
     keys = ("rmse_Nm", "l1_Nm", "skill", "rmse_low_Nm", "rmse_high_Nm")
     banded = (*keys, "coverage_95", "interval_score_Nm")
@@ -109,19 +108,17 @@ def test_rivals_are_rows_and_copies_score_alike(run, manifest: Path, tmp_path: P
     assert rows["copy", "free"]["skill"] is None
     assert 0.0 < rows["gmo", "all"]["observer_us"] < rows["gmo", "all"]["command_us"]
     assert rows["copy", "all"]["observer_us"] is rows["zero", "all"]["command_us"] is None
-    code, out, err = run(*asked(manifest, *words))  # on the screen that everybody sees
-    assert code == 0, err
+    out = ran(*asked(manifest, *words))[0]  # on the screen that everybody sees
     (silent,) = [line for line in out.splitlines() if "no answer" in line]
     assert silent == "silent, alone: no answer for 100.0 % of the time, read as 0"
     check_colours((manifest.with_name("out") / "index.html").read_text("utf-8"))
 
 
 @pytest.mark.slow
-def test_a_second_run_does_what_is_left_and_the_same_bytes(run, manifest, monkeypatch) -> None:
+def test_a_second_run_does_what_is_left_and_the_same_bytes(run, ran, manifest, monkeypatch):
     """The same but for times, which are held here."""
     monkeypatch.setattr("vftcli.reproduction.scoring.thread_time", lambda: 0.0)
-    code, out, err = run(*asked(manifest))
-    assert code == 0, err
+    out, err = ran(*asked(manifest))
     assert f"gone: no {FIXTURES / 'nowhere.csv'}; source: a page that has it" in err
     assert max(map(len, out.splitlines())) <= 80
     folder = manifest.with_name("out")
@@ -140,7 +137,7 @@ def test_a_second_run_does_what_is_left_and_the_same_bytes(run, manifest, monkey
 
 
 @pytest.mark.slow
-def test_planted_pushes_are_scored_against_their_truth(run, tmp_path: Path) -> None:
+def test_planted_pushes_are_scored_against_their_truth(run, ran, tmp_path: Path) -> None:
     shutil.copy(CIRCLE, tmp_path / "log.csv")
     (tmp_path / "my.toml").write_text(
         '[[log]]\nname = "a"\narm = "UR5"\nfile = "log.csv"\nrobot = "ur5"\ntruth = "free"\n'
@@ -148,8 +145,7 @@ def test_planted_pushes_are_scored_against_their_truth(run, tmp_path: Path) -> N
     )
     words = ("benchmark", tmp_path / "my.toml", "--jobs", "0", "-o", tmp_path / "out")
     assert run(*words, "--observer", "gmo")[0] == 2  # methods are the tool's own
-    code, _, err = run(*words)
-    assert code == 0, err
+    ran(*words)
     (pushed,) = tmp_path.glob("out/made/*/a-pushed.parquet")
     truth = pl.read_parquet(f"{pushed}.truth.parquet")
     # It is scored against this truth, of the pushed log alone in contact, of the other when free.
@@ -162,14 +158,13 @@ def test_planted_pushes_are_scored_against_their_truth(run, tmp_path: Path) -> N
 
 
 @pytest.mark.slow
-def test_another_file_ends_with_one_line_or_marks_its_rows(run, refused, manifest: Path) -> None:
+def test_another_file_ends_with_one_line_or_marks_its_rows(ran, refused, manifest: Path) -> None:
     manifest.write_text(MANIFEST.replace('file = "ur5', f'sha256 = "{"1" * 64}"\nfile = "ur5', 1))
     error = refused(*asked(manifest))
     assert "circle: " in error
     assert "sha256" in error
     assert not manifest.with_name("out").exists()
-    code, out, err = run(*asked(manifest, "--anyway"))
-    assert code == 0, err
+    out = ran(*asked(manifest, "--anyway"))[0]
     assert "scored despite a complaint (--anyway): circle" in out
 
 
@@ -278,7 +273,7 @@ def test_every_kind_of_entry_is_scored_by_all_that_it_can_be(run, kinds: Path) -
 
 
 @pytest.mark.slow
-def test_a_method_that_lacks_an_arm_is_named(run, manifest: Path, tmp_path: Path) -> None:
+def test_a_method_that_lacks_an_arm_is_named(ran, manifest: Path, tmp_path: Path) -> None:
     """Estimates of the first second of one of two arms."""
     one = MANIFEST.partition('free = ["gone"]')[0]
     manifest.write_text(one + one.replace('"circle"', '"again"').replace('"UR5"', '"UR5 b"'))
@@ -286,8 +281,7 @@ def test_a_method_that_lacks_an_arm_is_named(run, manifest: Path, tmp_path: Path
     t = np.arange(0.0, 1.0, 0.01)
     part = pl.DataFrame({"t": t, **{f"tau_ext/{j}": 0.0 * t for j in range(1, 7)}})
     part.write_csv(tmp_path / "zz" / "circle.csv")
-    code, out, err = run(*asked(manifest, "--outside", f"zz={tmp_path / 'zz'}"))
-    assert code == 0, err
+    out = ran(*asked(manifest, "--outside", f"zz={tmp_path / 'zz'}"))[0]
     rows = [line.split()[0] for line in out.splitlines()]
     assert "best" in rows
     assert "zz" not in rows
@@ -361,10 +355,9 @@ def test_times_are_printed_in_the_form_that_is_asked_for(run, monkeypatch) -> No
 
 
 @pytest.mark.slow
-def test_one_table_alone(run, refused, tmp_path: Path) -> None:
+def test_one_table_alone(ran, refused, tmp_path: Path) -> None:
     words = ("reproduce", "huang2025", "--only", "table4,fig11", "-o", tmp_path / "out")
-    code, out, err = run(*words)
-    assert code == 0, err
+    out = ran(*words)[0]
     assert "Table IV" in out
     assert "a picture" in out
     names = {path.name for path in (tmp_path / "out").iterdir()}

@@ -45,10 +45,9 @@ def test_release_rows(run) -> None:
 
 
 @pytest.mark.slow
-def test_log_becomes_a_folder(run, refused, tmp_path: Path) -> None:
+def test_log_becomes_a_folder(run, ran, refused, tmp_path: Path) -> None:
     folder = tmp_path / "out"
-    code, out, err = run(*PANDA, "-o", folder)
-    assert code == 0
+    out, err = ran(*PANDA, "-o", folder)
     assert "kfo-fe through pinv(Jᵀ)" in err
     assert re.search(r"variable\s+6", out)
     _, _, err = run(*PANDA, "--observer", "best")
@@ -87,10 +86,9 @@ def test_estimates_and_truth_are_forces_too(run, tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_it_says_what_was_written(run, tmp_path: Path) -> None:
+def test_it_says_what_was_written(run, ran, tmp_path: Path) -> None:
     words = ("annotate", EPISODES, "-o", tmp_path / "copy", "--add", "wrench,contact")
-    code, _, err = run(*words)
-    assert code == 0, err
+    err = ran(*words)[1]
     assert "3 episodes (3 done), 540 frames, panda, kfo-zoh, causal" in err
     assert "wrench: N, N·m, flange axes" in err
     assert "contact: 1 in a contact of the list, else 0" in err
@@ -162,10 +160,9 @@ def excitation(tmp_path_factory):
 
 
 @pytest.mark.slow
-def test_a_log_becomes_a_robot_that_estimate_uses(run, excitation, here: Path) -> None:
+def test_a_log_becomes_a_robot_that_estimate_uses(run, ran, excitation, here: Path) -> None:
     words = ("--robot", "ur5", "--method", "base", "-o", "my_robot.toml")
-    code, out, err = run("identify", excitation, *words)
-    assert code == 0, err
+    out = ran("identify", excitation, *words)[0]
     assert "identified" in out
     written = {path.name for path in here.iterdir()}
     assert written >= {"my_robot.toml", "my_robot.html", "my_robot.run.json"}
@@ -176,10 +173,9 @@ def test_a_log_becomes_a_robot_that_estimate_uses(run, excitation, here: Path) -
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("here")
-def test_a_fit_says_without_being_asked_that_something_touched_the_arm(run) -> None:
+def test_a_fit_says_without_being_asked_that_something_touched_the_arm(ran) -> None:
     words = ("--robot", "ur5", "--method", "friction", "-o", "r.toml")
-    code, _, err = run("identify", CIRCLE, *words)
-    assert code == 0
+    err = ran("identify", CIRCLE, *words)[1]
     (said,) = [line for line in err.splitlines() if "suspected contacts" in line]
     assert said.endswith("are left out of the fit")
     assert "presliding" not in err  # a fact: with --details
@@ -248,12 +244,11 @@ def test_several_logs_that_fill_the_screen_have_a_line_each(run) -> None:
     assert run("inspect", *[CIRCLE] * 4, *robot, "--details")[1].count("longest step") == 4
 
 
-def test_names_with_control_characters_are_shown_harmlessly(run, tmp_path: Path) -> None:
+def test_names_with_control_characters_are_shown_harmlessly(ran, tmp_path: Path) -> None:
     names = ("\x1b[31mred", "two\nlines", "<b>three</b>")
     log = Recording(t=0.1 * np.arange(5), q=np.zeros((5, 3)), joint_names=names)
     convert(log, tmp_path / "x.parquet")
-    code, out, _ = run("inspect", tmp_path / "x.parquet")
-    assert code == 0
+    out = ran("inspect", tmp_path / "x.parquet")[0]
     assert "\x1b" not in out
     assert r"two\nlines" in out
 
@@ -293,9 +288,8 @@ def pushed(free: Path) -> Path:
     return path
 
 
-def test_the_tables_and_the_calls_of_a_franka(free: Path, pushed: Path, run) -> None:
-    code, out, err = run("thresholds", free, *COLUMNS, "--rate", 60, "--check", pushed)
-    assert code == 0, err
+def test_the_tables_and_the_calls_of_a_franka(free: Path, pushed: Path, ran) -> None:
+    out, err = ran("thresholds", free, *COLUMNS, "--rate", 60, "--check", pushed)
     assert "contact 60 × an hour" in out
     assert "robot.set_collision_behavior(" in out
     assert "collision_config:" in out
@@ -303,9 +297,7 @@ def test_the_tables_and_the_calls_of_a_franka(free: Path, pushed: Path, run) -> 
     assert "thresholds are extrapolated" in err
     # The JSON stands alone, and the push is found.
     words = ("--rate", 60, "--check", pushed, "--check", free, "--json")
-    code, out, _ = run("thresholds", free, *COLUMNS, *words)
-    assert code == 0
-    record = json.loads(out)
+    record = json.loads(ran("thresholds", free, *COLUMNS, *words)[0])
     assert record["rate_per_h"] == 60.0
     # Noise of .2 N·m has its largest of 3000 at 3.4 sd; the tail reaches further by some e-folds.
     assert all(0.6 < row["threshold_Nm"] < 1.6 for row in record["joints"])
@@ -315,33 +307,29 @@ def test_the_tables_and_the_calls_of_a_franka(free: Path, pushed: Path, run) -> 
     assert (check["reference"], other["log"], other["contacts"]) == (None, "free.npy", [])
 
 
-def test_the_robots_own_estimate_may_be_the_reference(free: Path, pushed: Path, run) -> None:
+def test_the_robots_own_estimate_may_be_the_reference(free: Path, pushed: Path, ran) -> None:
     """Beyond 3.4 sd of noise everything is a contact of that reference; the push is among them."""
     words = ("--rate", 60, "--check", pushed, "--reference", "vendor", "--json")
-    code, out, err = run("thresholds", free, *COLUMNS, *words)
-    assert code == 0, err
-    (check,) = json.loads(out)["checks"]
+    (check,) = json.loads(ran("thresholds", free, *COLUMNS, *words)[0])["checks"]
     assert check["reference"] == "vendor"
     assert [c["by"] for c in check["contacts"] if c["by"]] == ["J2"]
     assert check["smallest_detected_N"] is None
 
 
-def test_two_free_logs_are_counted_against_each_other(free: Path, pushed: Path, run) -> None:
-    code, out, err = run("thresholds", free, pushed, *COLUMNS, "--rate", 60, "--json")
-    assert code == 0, err
+def test_two_free_logs_are_counted_against_each_other(free: Path, pushed: Path, ran) -> None:
+    out = ran("thresholds", free, pushed, *COLUMNS, "--rate", 60, "--json")[0]
     counted = {row["log"]: row for row in json.loads(out)["left_out"]}
     assert counted["pushed.npy"]["joints"][1] >= 1
     assert counted["free.npy"]["joints"][1] == 0
 
 
 @pytest.mark.slow
-def test_a_simulated_log_is_checked_against_the_truth_beside_it(run, refused) -> None:
+def test_a_simulated_log_is_checked_against_the_truth_beside_it(ran, refused) -> None:
     words = ("--robot", "panda", "--rate", 60, "--anyway")
     error = refused("thresholds", BEARING, "--robot", "panda")
     assert "looks touched: 2" in error  # by 20 N and more
     assert "take it all with --anyway" in error
-    code, out, err = run("thresholds", BEARING, *words, "--check", BEARING)
-    assert code == 0, err
+    out, err = ran("thresholds", BEARING, *words, "--check", BEARING)
     assert "of 3 contacts detected" in out
     assert "contacts are those of the reference file:panda_bearing.csv.truth.parquet" in err
     # It is no free log: J2 bears the load for half of it.
@@ -359,9 +347,8 @@ FREE_LOGS["ur3/identification.bag"] = ("--robot", "ur3", "--columns=-tau")
 
 
 @pytest.mark.parametrize("name", FREE_LOGS)
-def test_real_free_logs_are_accepted(name: str, logs: Path, run) -> None:
-    code, out, err = run("thresholds", logs / name, *FREE_LOGS[name], "--json")
-    assert code == 0, err
+def test_real_free_logs_are_accepted(name: str, logs: Path, ran) -> None:
+    out, err = ran("thresholds", logs / name, *FREE_LOGS[name], "--json")
     assert "looks touched" not in err
     # what is printed as a threshold of the wrench is no wider than it is high
     record = json.loads(out)

@@ -40,25 +40,23 @@ def turned(here: Path) -> str:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("command", [*COMMANDS, "convert"])
-def test_a_sound_log_is_said_to_be_sound(command: str, run) -> None:
+def test_a_sound_log_is_said_to_be_sound(command: str, ran) -> None:
     words = COMMANDS.get(command, ("-o", "other.csv"))
-    code, out, err = run(*command.split(), CIRCLE, *words, "--json", "-v")
-    assert code == 0, err
+    out, err = ran(*command.split(), CIRCLE, *words, "--json", "-v")
     assert "log health: sound" in err.splitlines()
     # the short recipe has none, and the UR5's friction follows them where a command models the log
     assert err.count("no joint temperatures") == (command != "convert")
     json.loads(out)
 
 
-def test_a_log_with_temperatures_is_modelled_by_them(run) -> None:
+def test_a_log_with_temperatures_is_modelled_by_them(ran) -> None:
     """At 35 °C, where the profile stands, the estimate is that without; in the cold it is not."""
     table = pl.read_csv(CIRCLE, separator=" ").head(500)
     estimates = {}
     for name, temperatures in (("untold", []), ("warm", 6 * [35.0]), ("cold", 6 * [25.0])):
         columns = {f"joint_temperatures_{j}": pl.lit(x) for j, x in enumerate(temperatures)}
         table.with_columns(**columns).write_csv(f"{name}.csv", separator=" ")
-        code, _, err = run("estimate", f"{name}.csv", *COMMANDS["estimate"], "--force", "-v")
-        assert code == 0, err
+        err = ran("estimate", f"{name}.csv", *COMMANDS["estimate"], "--force", "-v")[1]
         assert ("no joint temperatures" in err) is (name == "untold")
         estimates[name] = pl.read_parquet("out/estimates.parquet")
     assert estimates["warm"].equals(estimates["untold"])
@@ -77,9 +75,8 @@ def test_a_meaningless_log_is_one_line_and_nothing_is_written(command, turned, r
 # identify has a guard of its own: links that explain nothing make no robot.
 @pytest.mark.slow
 @pytest.mark.parametrize("command", sorted(COMMANDS.keys() - {"identify"}))
-def test_anyway_goes_on_and_says_so_first(command: str, turned: str, run) -> None:
-    code, _, err = run(*command.split(), turned, *COMMANDS[command], "--anyway")
-    assert code == 0, err
+def test_anyway_goes_on_and_says_so_first(command: str, turned: str, ran) -> None:
+    err = ran(*command.split(), turned, *COMMANDS[command], "--anyway")[1]
     lines = err.splitlines()
     (doubt,) = [line for line in lines if line.startswith("MEANINGLESS")]
     assert "effort-sign" in doubt
@@ -87,11 +84,10 @@ def test_anyway_goes_on_and_says_so_first(command: str, turned: str, run) -> Non
 
 
 @pytest.mark.slow
-def test_every_output_of_a_report_carries_what_was_overridden(turned, run, here: Path) -> None:
+def test_every_output_of_a_report_carries_what_was_overridden(turned, ran, here: Path) -> None:
     truth = f"file:{CIRCLE}.truth.parquet"
     words = ("--reference", truth, "--observer", "gmo", "-o", "out", "--anyway")
-    code, _, err = run("report", turned, *UR5, *words)
-    assert code == 0, err
+    ran("report", turned, *UR5, *words)
     out = here / "out"
     record = json.loads((out / "run.json").read_text("utf-8"))
     (examined,) = record["examination"]
@@ -111,10 +107,9 @@ def test_every_output_of_a_report_carries_what_was_overridden(turned, run, here:
     assert "effort-sign" in pl.read_parquet_metadata(out / "estimates.parquet")["vftcli"]
 
 
-def test_an_open_effort_heals_the_log(turned: str, run) -> None:
+def test_an_open_effort_heals_the_log(turned: str, run, ran) -> None:
     words = ("--observer", "gmo", "--set", "log.effort=auto", "-o", "out", "--json")
-    code, out, err = run("estimate", turned, *UR5, *words)
-    assert code == 0, err
+    out = ran("estimate", turned, *UR5, *words)[0]
     record = json.loads(out)
     assert record["examination"][0]["overridden"] == []
     assert "effort-used" in [repair["code"] for repair in record["repairs"]]
@@ -129,9 +124,8 @@ def test_free_runs_are_examined_too_and_reported_by_name(turned: str, refused) -
     assert "turned.csv: effort-sign" in refused("estimate", CIRCLE, *UR5, *words)
 
 
-def test_inspect_examines_the_users_own_arm(turned: str, run) -> None:
-    code, out, _ = run("inspect", turned, *UR5, "--json")
-    assert code == 0
+def test_inspect_examines_the_users_own_arm(turned: str, ran) -> None:
+    out = ran("inspect", turned, *UR5, "--json")[0]
     assert "effort-sign" in [finding["code"] for finding in json.loads(out)["findings"]]
 
 
@@ -208,23 +202,21 @@ def test_a_column_of_a_known_format_that_is_there_twice_is_not_chosen_from(tmp_p
     assert "recipe" not in said  # nothing is missing
 
 
-def test_a_cut_last_row_is_dropped_and_said(tmp_path: Path, run) -> None:
+def test_a_cut_last_row_is_dropped_and_said(tmp_path: Path, ran) -> None:
     log = saved(tmp_path / "log.csv", [*table(), ["3.2", "0.1"]], end="")
     words = ("--robot", "ur5", "--columns", COLUMNS, "-o", tmp_path / "out", "--details")
-    code, _, stderr = run("estimate", log, *words)
-    assert code == 0
+    stderr = ran("estimate", log, *words)[1]
     assert "last" in stderr
     assert "400 samples" in stderr
 
 
 @pytest.mark.parametrize("samples", [2, 3])
-def test_an_arm_that_jumps_in_a_few_samples_is_no_motion_to_fit(tmp_path, run, samples):
+def test_an_arm_that_jumps_in_a_few_samples_is_no_motion_to_fit(tmp_path, ran, samples):
     """Samples 12 s apart, the errors of the doctor overruled: time enough, samples too few."""
     rows = [[12.0 * k, *[0.5 * k] * 6, *[0.1] * 6, *[0.0] * 6] for k in range(samples)]
     log = saved(tmp_path / "log.csv", [[str(x) for x in row] for row in rows])
     words = ("--robot", "ur5", "--columns", "t,q:6,dq:6,current:6", "--anyway", "--details")
-    code, _, stderr = run("estimate", log, *words, "-o", tmp_path / "out")
-    assert code == 0
+    stderr = ran("estimate", log, *words, "-o", tmp_path / "out")[1]
     assert "too few samples" in " ".join(stderr.split())
 
 

@@ -319,9 +319,8 @@ def test_if_all_are_bad_nothing_is_written(tmp_path: Path, run) -> None:
     assert not out.exists()
 
 
-def test_each_log_has_the_robot_that_it_settles_itself(run) -> None:
-    code, out, _ = run("contacts", TAPS, OTHER)
-    assert code == 0
+def test_each_log_has_the_robot_that_it_settles_itself(ran) -> None:
+    out = ran("contacts", TAPS, OTHER)[0]
     assert out.startswith("2 logs · ur5 and panda")
 
 
@@ -377,21 +376,19 @@ def opened(monkeypatch) -> list[str]:
     return found
 
 
-def test_a_page_goes_before_the_recording_and_that_is_named(run, opened, tmp_path: Path) -> None:
+def test_a_page_goes_before_the_recording_and_that_is_named(ran, opened, tmp_path: Path) -> None:
     out = tmp_path / "o t"
     out.mkdir()
     (out / "recording.rrd").touch()
-    code, _, err = run(*RELEASED, "-o", out, "--open")
-    assert code == 0
+    err = ran(*RELEASED, "-o", out, "--open")[1]
     assert opened == [(out / "index.html").resolve().as_uri()]
     assert f"wrote {out}: open {out / 'index.html'}\n" in err
     assert f"the recording: rerun {out / 'recording.rrd'}\n" in err
 
 
-def test_no_browser_is_said(run, tmp_path: Path, monkeypatch) -> None:
+def test_no_browser_is_said(ran, tmp_path: Path, monkeypatch) -> None:
     monkeypatch.setattr(webbrowser, "open", lambda _address: False)
-    code, _, err = run(*RELEASED, "-o", tmp_path / "out", "--open")
-    assert code == 0
+    err = ran(*RELEASED, "-o", tmp_path / "out", "--open")[1]
     assert f"no browser could be started: open {tmp_path / 'out' / 'index.html'} in one" in err
 
 

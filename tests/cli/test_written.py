@@ -72,13 +72,12 @@ def test_an_arm_is_looked_for_where_it_is_named_or_tells_what_an_effort_is(run) 
 
 
 @pytest.mark.slow
-def test_a_second_log_is_offered_as_free_motion(run, here: Path, logs: Path) -> None:
+def test_a_second_log_is_offered_as_free_motion(run, ran, here: Path, logs: Path) -> None:
     """The load's own log, the same motion without the load, and a pose that hands push."""
     for name in ("load_14harm.csv", "free_14harm.csv", "push_pose.csv"):
         shutil.copy(logs / "ur10e" / name, here)
     named = ("load_14harm.csv", "free_14harm.csv", "push_pose.csv")
-    code, out, err = run("inspect", *named, "--robot", "ur10e", "--json", "-o", NAME)
-    assert code == 0
+    out, err = ran("inspect", *named, "--robot", "ur10e", "--json", "-o", NAME)
     columns = "t,q:6,dq:6,current:6,target_current:6,target_torque:6"
     found = {"robot": "ur10e", "columns": columns, "free": ["free_14harm.csv"]}
     found["reference"] = "two-cycle"
@@ -266,10 +265,9 @@ def pair(tmp_path: Path) -> list[Path]:
     return paths
 
 
-def test_a_table_has_the_rows_of_both_logs(run, pair: list[Path], monkeypatch) -> None:
+def test_a_table_has_the_rows_of_both_logs(run, ran, pair: list[Path], monkeypatch) -> None:
     words = ("--robot", "ur5", "--reference", f"file:{CIRCLE}.truth.parquet", "--json")
-    code, out, err = run("compare", *pair, *words)
-    assert code == 0, err
+    out = ran("compare", *pair, *words)[0]
     samples = {row["recording"]: row["samples"] for row in json.loads(out)["rows"]}
     assert samples["a/log.csv"] == ROWS["a"] - 1
     assert samples["b/log.csv"] == ROWS["b"] - 1
@@ -281,9 +279,8 @@ def test_a_table_has_the_rows_of_both_logs(run, pair: list[Path], monkeypatch) -
 
 
 @pytest.mark.slow
-def test_an_identified_robot_has_one_rms_a_joint_and_log(run, pair: list[Path], here) -> None:
-    code, _, err = run("identify", *pair, "--robot", "ur5", "-o", "robot.toml")
-    assert code == 0, err
+def test_an_identified_robot_has_one_rms_a_joint_and_log(ran, pair: list[Path], here) -> None:
+    ran("identify", *pair, "--robot", "ur5", "-o", "robot.toml")
     robot = tomllib.loads((here / "robot.toml").read_text(encoding="utf-8"))
     sets = robot["identification"]["residuals"]
     assert [one["log"] for one in sets] == ["a/log.csv", "b/log.csv"]
@@ -291,16 +288,14 @@ def test_an_identified_robot_has_one_rms_a_joint_and_log(run, pair: list[Path], 
 
 
 @pytest.mark.slow
-def test_a_payload_pair_of_equal_names_is_scored_on_the_log_without_load(run, here) -> None:
+def test_a_payload_pair_of_equal_names_is_scored_on_the_log_without_load(run, ran, here) -> None:
     """The loaded log of a pair is the heavier one, whatever the files are called."""
     assert run("simulate", "payload-pair", "-o", "log.csv", "--seed", 1)[0] == 0
     for name, ending in (("a", "csv"), ("b", "free.csv")):
         (here / name).mkdir()
         (here / f"log.{ending}").rename(here / name / "log.csv")
     words = ("--robot", "ur5", "--method", "payload", "--json", "-o", "robot.toml")
-    code, out, err = run("identify", "a/log.csv", "b/log.csv", *words)
-    assert code == 0, err
-    record = json.loads(out)
+    record = json.loads(ran("identify", "a/log.csv", "b/log.csv", *words)[0])
     assert {row["log"] for row in record["residuals"]} == {"b/log.csv"}
     found = {row["parameter"] for row in record["parameters"]}
     assert found == {"mass", "com_x", "com_y", "com_z"}
@@ -393,9 +388,8 @@ def checked(record: dict[str, Any]) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("words", RESULTS, ids=lambda words: f"{words[0]} {len(words)}")
-def test_every_command_has_the_envelope(words: tuple[object, ...], run, here: Path) -> None:
-    code, out, err = run(*words, "--json")
-    assert code == 0, err
+def test_every_command_has_the_envelope(words: tuple[object, ...], ran, here: Path) -> None:
+    out = ran(*words, "--json")[0]
     record = json.loads(out)
     checked(record)
     assert len(record["logs"]) == (isinstance(words[1], Path))
@@ -406,15 +400,14 @@ def test_every_command_has_the_envelope(words: tuple[object, ...], run, here: Pa
 
 
 @pytest.mark.slow
-def test_several_logs_have_an_entry_each_with_what_was_found(run, tmp_path: Path) -> None:
+def test_several_logs_have_an_entry_each_with_what_was_found(ran, tmp_path: Path) -> None:
     written = ("--observer", "gmo", "-o", tmp_path / "out")
     for name, key, *options in (
         ("contacts", "contacts", *SHORT),
         ("inspect", "findings"),
         ("report", "contacts", *SHORT, *written),
     ):
-        code, out, err = run(name, TAPS, CIRCLE, *options, "--json")
-        assert code == 0, err
+        out = ran(name, TAPS, CIRCLE, *options, "--json")[0]
         record = json.loads(out)
         assert [log["recording"] for log in record["logs"]] == [TAPS.name, CIRCLE.name]
         assert all(key in log for log in record["logs"])
