@@ -212,7 +212,8 @@ def of_one_name(ask: Ask, logs: Logs) -> None:
 
 
 def copy_is_no_second_log(ask: Ask, logs: Logs) -> None:
-    refused(ask, logs.load, copied(logs.load, "copy.parquet"))
+    for second in (logs.load, copied(logs.load, "copy.parquet")):
+        refused(ask, logs.load, second)
 
 
 def copy_is_no_free_run(ask: Ask, logs: Logs, more: tuple[str, ...] = ()) -> None:
@@ -250,10 +251,6 @@ def observers_permuted_before_a_sensor(ask: Ask, logs: Logs) -> None:
 
 def free_run_repeated(ask: Ask, logs: Logs, more: tuple[str, ...] = ()) -> None:
     refused(ask, logs.load, "--free", logs.free, "--free", logs.free, *more)
-
-
-def log_repeated(ask: Ask, logs: Logs) -> None:
-    refused(ask, logs.load, logs.load)
 
 
 def clock_shifted(ask: Ask, logs: Logs) -> None:
@@ -335,7 +332,7 @@ MANY, OBSERVED = (*COMPARED, "identify"), ("estimate", *COMPARED)
 RELATIONS: dict[str, tuple[Callable[..., None], tuple[str, ...]]] = {
     "rename": (renamed, SINGLE),
     "rename: two logs of one name": (of_one_name, MANY),
-    "copy: as a second log": (copy_is_no_second_log, MANY),
+    "repeat or copy a log": (copy_is_no_second_log, MANY),
     "copy: as a free run": (copy_is_no_free_run, ("estimate", "gains")),
     "copy: as a free run of the reference": (
         partial(copy_is_no_free_run, more=TWO_CYCLE), COMPARED),
@@ -349,7 +346,6 @@ RELATIONS: dict[str, tuple[Callable[..., None], tuple[str, ...]]] = {
     "permute observers before a sensor": (observers_permuted_before_a_sensor, ("compare",)),
     "repeat a free run": (free_run_repeated, ("estimate", "gains")),
     "repeat a free run of the reference": (partial(free_run_repeated, more=TWO_CYCLE), COMPARED),
-    "repeat a log": (log_repeated, MANY),
     "shift the clock": (clock_shifted, SINGLE),
     "wrap a joint": (joint_wrapped, SINGLE),
     "whole interval": (whole_interval, SINGLE[1:]),

@@ -140,6 +140,12 @@ class Tab:
           return [...living, ...still].map((x) => x.closest("figure").textContent);
         }""")
 
+    def check(self) -> None:
+        """Everything is drawn and fits, and no script failed."""
+        self.unfold()
+        assert (self.blank_charts(), self.errors) == ([], [])
+        assert self.overflow <= 0
+
     @property
     def overflow(self) -> int:
         """By how many pixels the page is wider than its window."""

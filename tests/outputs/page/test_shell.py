@@ -5,9 +5,11 @@ import shutil
 import sys
 from html import unescape
 
+import numpy as np
 import pytest
 from jinja2 import FileSystemBytecodeCache, UndefinedError
 
+from vftcli.outputs.charts import QUIET, Chart, ChartLine, Span, families_of
 from vftcli.outputs.page import shell
 from vftcli.outputs.page.shell import page, part, script_json
 from vftcli.signals import remarks as remarks_module
@@ -95,3 +97,107 @@ def test_compiled_templates_are_kept_and_a_full_disk_costs_no_page(room, tmp_pat
     for _ in range(2):  # compiled, then read
         assert shell.templates.__wrapped__().get_template("page.html").name == "page.html"
     assert len([*there.glob("templates/__pycache__/*.cache")]) == room
+
+
+# Charts as still drawings: places, ticks, lines, ribbons and what stands beside them.
+
+SCALES = shell.Scales(
+    shell.Box(128, 112, left=20, bottom=5, top=7, right=8), Span(2.0, 12.0), Span(-1.0, 4.0)
+)
+"""A plot of 100 by 100 with another room on each side."""
+
+
+def test_values_have_their_places_and_stripes_stay_in_the_plot() -> None:
+    np.testing.assert_allclose(SCALES.across(np.array([2.0, 7.0, 12.0])), [20, 70, 120])
+    np.testing.assert_allclose(SCALES.up(np.array([-1.0, 4.0])), [107, 7])
+    flat = SCALES._replace(x=Span(3.0, 3.0), y=Span(1.0, 1.0))
+    assert (flat.across(3.0), flat.up(1.0)) == (20.0, 107.0)
+    assert SCALES.inside((7.0, 99.0)).tolist() == [70.0, 120.0]
+    found = shell.stripes(SCALES, [(2.0, 3.0), (7.0, 7.0)])
+    assert found == "M20.0 7h10.0v100h-10.0zM70.0 7h0.5v100h-0.5z"
+
+
+def test_ticks_are_round_and_never_few() -> None:
+    np.testing.assert_allclose(shell.ticks(Span(0.0, 18.4), 9), np.arange(0.0, 20.0, 2.0))
+    np.testing.assert_allclose(shell.ticks(Span(-7.0, 12.0), 3), [-5.0, 0.0, 5.0, 10.0])
+    assert shell.ticks(Span(1.0, 1.0), 3) == pytest.approx([1.0])
+    for high in (1.0, 1.7, 3.3, 6.1, 14.0):
+        assert 3 <= len(shell.ticks(Span(-0.4 * high, high), 3)) <= 7
+    assert (shell.label(-0.5), shell.label(-0.0), shell.label(1e6)) == ("−0.5", "0", "1e+06")
+
+
+def test_a_line_breaks_where_nothing_is_known_and_stays_near() -> None:
+    t = np.arange(5.0)
+    assert shell.path_of(SCALES, t, np.array([0.0, 5.0, np.nan, 5.0, 0.0])).count("M") == 2
+    assert shell.path_of(SCALES, t, np.array([np.nan, 1.0, np.nan, 5.0, 0.0])).count("h.01") == 1
+    half = shell.ribbon(SCALES, t, np.zeros(5), np.array([1.0, 1.0, np.nan, 1.0, 1.0]))
+    assert half.count("Z") == 2
+    t = np.array([2.0, 3.0])
+    assert shell.path_of(SCALES, t, np.array([-1.0, 1e9])) == "M20 107l10-200"
+    assert shell.path_of(SCALES, t, np.array([-1.0, -1e9])) == "M20 107l10 100"
+
+
+def test_a_path_is_drawn_to_a_tenth_without_its_errors_adding_up() -> None:
+    """Moves of 0.04 are nothing, ten of them 0.4."""
+    assert shell.polyline([[0.0, 0.0], [0.5, -1.1], [0.6, 9.0]]) == "M0 0l.5-1.1 .1 10.1"
+    points = np.column_stack([0.04 * np.arange(11), np.zeros(11)])
+    moves = re.findall(r"-?[\d.]+", shell.polyline(points).partition("l")[2])[::2]
+    assert sum(map(float, moves)) == pytest.approx(0.4)
+    assert shell.polyline([[3.0, 4.0]]) == "M3 4h.01"
+
+
+def chart(t: np.ndarray, *lines: ChartLine, **kind: object) -> Chart:
+    n = lines[0].values.shape[1]
+    return Chart("k", "K", ("N",) * n, tuple("abcdef"[:n]), t, lines, **kind)  # type: ignore[arg-type]
+
+
+def test_a_ribbon_goes_along_both_edges_and_is_grey_where_no_contact_is_listed() -> None:
+    """Between two level lines it fills its whole box: the area of its outline, by Gauss."""
+    line = ChartLine("best", np.zeros((6, 1)), "#112233", half=np.full((6, 1), 2.0))
+    html = shell.part("svg/multiples", chart(np.arange(6.0), line))
+    assert QUIET not in html
+    (outline,) = set(re.findall(r'"(M[^"]*)Z"', html))
+    steps = np.array([float(number) for number in re.findall(r"-?\d*\.?\d+", outline)])
+    x, y = np.cumsum(steps.reshape(-1, 2), axis=0).T
+    area = 0.5 * abs(np.sum(x * np.roll(y, -1) - y * np.roll(x, -1)))
+    assert 1.0 < area == pytest.approx(np.ptp(x) * np.ptp(y))
+    quiet = line._replace(quiet=np.array([True, True, False, False, True, True]))
+    html = shell.part("svg/multiples", chart(np.arange(6.0), quiet))
+    assert html.count('class="rim"/>') == 1 + 1  # one more in the legend
+    assert html.count('class="floor"/>') == 1
+    assert QUIET in html
+
+
+def test_a_scale_holds_ribbons_and_bands_and_neighbours_of_one_drive_size_share_it() -> None:
+    assert families_of(np.array([150.0, 150.0, 28.0, 28.0, 150.0])) == (1, 1, 2, 2, 3)
+    assert families_of(np.array([np.nan, np.nan])) == (1, 1)
+    t, values = np.arange(2.0), np.array([[1.0, 40.0, 3.0], [-1.0, 0.0, 0.0]])
+    shown = chart(t, ChartLine("a", values), families=(1, 1, 2))
+    assert shown.ends(0) == shown.ends(1)
+    assert shown.ends(0).high > 40.0
+    assert shown.ends(2).high < 4.0
+    ones = np.ones((2, 1))
+    ends = chart(t, ChartLine("a", ones, half=5.0 * ones)).ends(0)
+    assert (ends.low < -4.0, ends.high > 6.0) == (True, True)
+    ends = chart(t, ChartLine("a", ones), band=np.array([9.0])).ends(0)
+    assert (ends.low < -9.0, ends.high > 9.0) == (True, True)
+
+
+def test_only_what_is_shown_stands_in_the_small_pictures_and_names_are_words() -> None:
+    t, ones = np.arange(3.0), np.ones((3, 2))
+    named = {"first": "#112233", "<i>": "#445566", "later": "#778899"}
+    lines = [ChartLine(name, ones, paint, shown=name != "later") for name, paint in named.items()]
+    html = shell.part("svg/multiples", chart(t, *lines))
+    assert html.count("<figure") == 2
+    # Each line has a switch, those that are shown a place in the legend.
+    assert html.count('stroke="#112233"') == 2 + 1 + 1
+    assert html.count('stroke="#778899"') == 1
+    assert html.count('aria-pressed="false"') == 1
+    assert "legend" in html
+    assert "legend" not in shell.part("svg/multiples", chart(t, lines[0]))  # one line needs none
+    doubtful = chart(t, lines[0])._replace(panels=("J1†", "J2"))
+    assert "†: the joint rests most of the time" in shell.part("svg/multiples", doubtful)
+    axes = shell.part("svg/axes", SCALES, "<i>")
+    for text in (html, axes, shell.part("svg/svg", shell.Box(), "<i>", "<g/>")):
+        assert "<i>" not in text
+        assert "&lt;i&gt;" in text
