@@ -157,17 +157,6 @@ def test_at_small_speed_the_energy_is_that_of_a_mass(scale):
     np.testing.assert_allclose(bent, 0.5 * alpha * np.asarray(p.stiffness) * 0.01, rtol=1e-12)
 
 
-def test_controllers_run_side_by_side_as_alone():
-    rng = np.random.default_rng(3)
-    force = rng.normal(0.0, 10.0, (300, 6)) * np.repeat([1.0, 0.3], 3)
-    dragged = np.abs(force) > np.repeat([8.0, 2.0], 3)
-    found = law.controllers(UR5, alphas=(1.0, 1.9))
-    together = run(found, np.where(dragged, force, 0.0), dragged)
-    for n, controller in enumerate(found):
-        alone = run([controller], np.where(dragged, force, 0.0), dragged)
-        np.testing.assert_array_equal(together.x[:, n], alone.x[:, 0])
-
-
 def spectral_radius(mass: float, damping: float, stiffness: float, period: float) -> float:
     """Of one step of (49)–(51) without force."""
     a = np.array([1.0 - period * damping / mass, -period * stiffness / mass])

@@ -28,8 +28,7 @@ def parameters(*assignments: str):
     return from_table(UR5.admittance, "ur5", parse_settings(assignments))
 
 
-Force = tuple[Wrench, np.ndarray]
-"""A wrench and the joint positions along it."""
+Force = tuple[Wrench, np.ndarray]  # A wrench and the joint positions along it.
 
 
 def push(force: float = 24.0, axis: int = 1, length: float = 14.0) -> Force:

@@ -19,8 +19,7 @@ from vftcli.signals.errors import MissingSignalError
 
 FIXTURE = Path(__file__).parent.parent.parent / "fixtures" / "ur5_circle.csv"
 DENSITY = {"kfo.noise_convention": "density"}
-MOVING = [0, 1, 2, 3, 5]
-"""Joint 5 of the circle rests."""
+MOVING = [0, 1, 2, 3, 5]  # Joint 5 of the circle rests.
 
 
 @pytest.fixture(scope="session")

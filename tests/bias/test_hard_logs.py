@@ -110,8 +110,7 @@ def test_no_noise_in_the_loaded_part_still_leaves_a_filter():
 
 
 FIXTURE = Path(__file__).parents[2] / "fixtures" / "ur5_circle.csv"
-NEAR = 0.5
-"""Around a bad sample its own joint may say anything. [s]"""
+NEAR = 0.5  # Around a bad sample its own joint may say anything. [s]
 
 
 @cache

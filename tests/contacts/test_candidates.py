@@ -14,9 +14,9 @@ from vftcli.contacts.search import (
     two_state_odds,
 )
 from vftcli.robots.terms import Blocks
-from vftcli.signals.arrays import Array, Mask
+from vftcli.signals.arrays import Array
 from vftcli.signals.estimation import SPIKE
-from vftcli.wrench.model_error import error_process
+from vftcli.wrench.model_error import ErrorProcess, error_process
 
 
 def joints_of(d: Array) -> tuple[Blocks, Array]:
@@ -26,9 +26,8 @@ def joints_of(d: Array) -> tuple[Blocks, Array]:
     return blocks(d, np.full_like(d, 0.5)), jacobian
 
 
-def touched_blocks(log: Blocks, jacobian: Array) -> Mask:
-    courses = error_process(noise(), log), error_process(noise(), turned_round(log))
-    return filtered_contacts(log, courses, jacobian)
+def both_ways(log: Blocks, joints: int = 1) -> tuple[ErrorProcess, ErrorProcess]:
+    return error_process(noise(joints), log), error_process(noise(joints), turned_round(log))
 
 
 def pushed(count: int, seed: int) -> Array:
@@ -47,11 +46,11 @@ def test_a_contact_is_what_is_99_percent_sure(push):
     d = np.zeros((300, 1))
     d[140:143] = push
     log, jacobian = joints_of(d)
-    courses = error_process(noise(), log), error_process(noise(), turned_round(log))
+    courses = both_ways(log)
     size = PUSH[0] * jacobian[:, 0]
     odds = max(float(both[141]) for each in two_state_odds(log, courses, size) for both in each)
     assert 0.98 < 1.0 / (1.0 + np.exp(-odds)) < 0.995
-    assert touched_blocks(log, jacobian).any() == (1.0 / (1.0 + np.exp(-odds)) > 0.99)
+    assert filtered_contacts(log, courses, jacobian).any() == (1.0 / (1.0 + np.exp(-odds)) > 0.99)
 
 
 def textbook_odds(d, process, size, time, lasts) -> Array:
@@ -105,7 +104,7 @@ def test_the_odds_are_those_of_the_textbook_filter():
     d[60:75, 1] -= np.linspace(0.0, 3.0, 15)
     log = blocks(d, np.full_like(d, 0.5))
     size = np.column_stack([np.linspace(10.0, 20.0, 150), np.linspace(8.0, 4.0, 150)])
-    ahead, back = error_process(noise(2), log), error_process(noise(2), turned_round(log))
+    ahead, back = both_ways(log, 2)
     found = two_state_odds(log, (ahead, back), size)
     for (forward, backward), (time, lasts) in zip(found, SEARCHES, strict=True):
         there = textbook_odds(d, ahead, size, time, lasts)
@@ -120,7 +119,7 @@ def test_a_long_log_is_searched_in_stretches_as_if_in_one(monkeypatch):
     d = pushed(2000, 5)
     d[1200:1300] += 5.0
     log, _ = joints_of(d)
-    courses = error_process(noise(), log), error_process(noise(), turned_round(log))
+    courses = both_ways(log)
     size = np.full((2000, 1), 15.0)
     apart = two_state_odds(log, courses, size)
     monkeypatch.setattr("vftcli.contacts.search.STRETCH", 1000.0)
@@ -135,6 +134,6 @@ def test_behind_a_gap_of_an_hour_the_odds_are_those_of_a_log_that_begins():
     """Contacts come every 30 s: by then one is there as often as not, and that is no 0/0."""
     log, _ = joints_of(drawn(300, np.random.default_rng(8)))
     log = log._replace(t=log.t + np.where(np.arange(300) < 150, 0.0, 3600.0))
-    courses = error_process(noise(), log), error_process(noise(), turned_round(log))
+    courses = both_ways(log)
     for each in two_state_odds(log, courses, np.full((300, 1), 15.0)):
         assert all(np.isfinite(odds).all() and odds[[145, 299]].max() < 0.0 for odds in each)

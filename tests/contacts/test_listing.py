@@ -28,6 +28,8 @@ from vftcli.signals.errors import ParameterError
 from vftcli.signals.recording import Recording
 from vftcli.simulation import load_scenario, simulate
 
+CIRCLE = read(FIXTURES / "ur5_circle.csv")
+
 
 @cache
 def listed(name, robot, free=None):
@@ -89,10 +91,9 @@ def part(recording: Recording, chosen: np.ndarray) -> Recording:
 
 @pytest.mark.slow
 def test_gaps_of_the_clock_move_no_row_by_more_than_a_few_blocks():
-    whole = read(FIXTURES / "ur5_circle.csv")
-    k = np.arange(whole.samples)
+    k = np.arange(CIRCLE.samples)
     kept = k[~((k > 1100) & (k < 1125)) & ~((k > 300) & (k < 330))]
-    rows = list_contacts(motion(part(whole, kept), "ur5", "0.3:4")).contacts
+    rows = list_contacts(motion(part(CIRCLE, kept), "ur5", "0.3:4")).contacts
     full = listed("ur5_circle.csv", "ur5", "0.3:4").contacts
     assert abs(len(rows) - len(full)) <= 1
     near = [min(abs(row.start - each.start) for each in full) for row in rows]
@@ -100,8 +101,7 @@ def test_gaps_of_the_clock_move_no_row_by_more_than_a_few_blocks():
 
 
 def test_at_15_hz_the_pushes_are_still_reported():
-    whole = read(FIXTURES / "ur5_circle.csv")
-    rows = list_contacts(motion(part(whole, np.arange(0, whole.samples, 8)), "ur5", "0.3:4"))
+    rows = list_contacts(motion(part(CIRCLE, np.arange(0, CIRCLE.samples, 8)), "ur5", "0.3:4"))
     true = true_contacts(*true_wrench("ur5_circle.csv"))
     scored = score(rows.contacts, true)
     # Blocks of 64 ms hide the tap of 23 N, .16 s long.
@@ -111,11 +111,10 @@ def test_at_15_hz_the_pushes_are_still_reported():
 
 
 def test_numbers_that_are_not_finite_are_refused():
-    whole = read(FIXTURES / "ur5_circle.csv")
-    current = np.array(whole.current)
+    current = np.array(CIRCLE.current)
     current[700:705] = np.nan
     with pytest.raises(ParameterError, match=r"5 of its 2501 samples are not finite"):
-        list_contacts(motion(replace(whole, current=current), "ur5", "0.3:4"))
+        list_contacts(motion(replace(CIRCLE, current=current), "ur5", "0.3:4"))
 
 
 def ur10e(logs: Path, name: str) -> Recording:
@@ -130,9 +129,8 @@ def ur10e(logs: Path, name: str) -> Recording:
     ],
 )
 def test_few_samples_do_not_say_that_nothing_touched(chosen, said):
-    whole = read(FIXTURES / "ur5_circle.csv")
     with pytest.raises(ParameterError, match=said):
-        list_contacts(motion(part(whole, np.arange(whole.samples)[chosen]), "ur5"))
+        list_contacts(motion(part(CIRCLE, np.arange(CIRCLE.samples)[chosen]), "ur5"))
 
 
 def test_four_hands_on_a_held_pose_with_free_motion_and_without(logs):
@@ -152,9 +150,9 @@ def test_four_hands_on_a_held_pose_with_free_motion_and_without(logs):
 
 def circle_carrying(carries: Callable[[np.ndarray], np.ndarray]) -> Recording:
     """The free circle of 4 s four times over, at 31 Hz, with 2.8 kg where `carries` of t says."""
-    whole, robot = read(FIXTURES / "ur5_circle.csv"), load_robot("ur5")
+    robot = load_robot("ur5")
     rows = np.tile(np.arange(0, 500, 4), 4)
-    signals = {name: whole.require(name)[rows] for name in ("q", "dq", "current")}
+    signals = {name: CIRCLE.require(name)[rows] for name in ("q", "dq", "current")}
     t = 0.032 * np.arange(len(rows))
     weight = load_regressor(robot.chain, signals["q"]) @ np.array([2.8, 0.0, 0.0, 0.1])
     signals["tau_ext"] = carries(t)[:, None] * weight
@@ -342,8 +340,7 @@ def free_with_pushes(logs: Path, force: float) -> Recording:
     return replace(log, current=log.require("current") - torque / robot.torque_constant)
 
 
-PUSHED = 4.0, 10.0, 16.0, 22.0, 28.0, 34.0
-"""When each of the pushes is in its middle. [s]"""
+PUSHED = 4.0, 10.0, 16.0, 22.0, 28.0, 34.0  # When each of the pushes is in its middle. [s]
 
 
 @pytest.mark.slow

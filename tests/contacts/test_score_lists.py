@@ -53,8 +53,7 @@ def scored(name: str, seed: int) -> tuple[Score, Mask]:
     return score(analysis.contacts.contacts, true_contacts(t, truth)), held
 
 
-Figures = dict[str, Any]
-"""What some logs of a scenario reached together."""
+Figures = dict[str, Any]  # What some logs of a scenario reached together.
 
 
 @cache

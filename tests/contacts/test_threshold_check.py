@@ -22,8 +22,7 @@ from vftcli.wrench.solvers import VirtualSensor
 T = np.arange(0.0, 20.0, 0.01)
 PUSHES = ((5.0, 6.0, 40.0), (9.0, 10.0, 10.0), (14.0, 15.0, 25.0))
 """From and to [s], force along z [N]; J2 takes it with a lever of .5 m."""
-LAG = 0.1
-"""Of the estimate behind the truth. [s]"""
+LAG = 0.1  # Of the estimate behind the truth. [s]
 
 
 def limits(torque: float, force: float) -> Thresholds:

@@ -18,11 +18,9 @@ from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.recording import Recording, Source
 
-STEADY = np.array([0.0, 0.0, 0.0, 1.0, 1.0, 1.0])
-"""The moments alone."""
+STEADY = np.array([0.0, 0.0, 0.0, 1.0, 1.0, 1.0])  # The moments alone.
 
-RATE = 10.0
-"""Samples a second. [Hz]"""
+RATE = 10.0  # Samples a second. [Hz]
 
 
 def free_log(name, seconds, scale=1.0, *, seed=0, joints=6, axes=6) -> ComparedSignals:

@@ -25,8 +25,7 @@ from vftcli.robots import load_robot
 from vftcli.robots.run import Run
 from vftcli.signals.recording import Recording
 
-RATES = (60.0, 12.0, 1.0)
-"""False alarms of one joint. [1/h]"""
+RATES = (60.0, 12.0, 1.0)  # False alarms of one joint. [1/h]
 
 
 def part(signals: ComparedSignals, start: float, stop: float) -> ComparedSignals:

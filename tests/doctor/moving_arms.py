@@ -9,8 +9,7 @@ from vftcli.robots.kernels import momentum_terms
 from vftcli.signals.arrays import Array
 from vftcli.signals.recording import Recording
 
-FRICTION = 4.0
-"""Coulomb friction of every joint. [N·m]"""
+FRICTION = 4.0  # Coulomb friction of every joint. [N·m]
 
 
 def carrying(robot: Robot, load: float) -> Robot:

@@ -19,8 +19,7 @@ from vftcli.readers.reading import read
 from vftcli.robots.chain import flange_jacobian
 from vftcli.signals.arrays import Array, Mask
 
-MIDDLE = 0.4
-"""Share of the log at which a few bad samples are planted."""
+MIDDLE = 0.4  # Share of the log at which a few bad samples are planted.
 
 
 def first_bad(table: Table) -> int:

@@ -174,8 +174,7 @@ def test_a_load_is_off_by_its_deviation():
 
 
 TIMES = 0.008 * np.arange(500)
-SPEED = np.array([1.0, 1.0, 1.0, 1.0, 1.0, 0.0])
-"""Joint 6 rests. [rad/s]"""
+SPEED = np.array([1.0, 1.0, 1.0, 1.0, 1.0, 0.0])  # Joint 6 rests. [rad/s]
 UR5E = load_robot("ur5e")
 LAWLESS = replace(UR5E, friction=tuple(replace(f, temperature=()) for f in UR5E.friction))
 SILENT = replace(UR5E, friction=tuple(replace(f, temperature_at=None) for f in LAWLESS.friction))

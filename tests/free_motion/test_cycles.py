@@ -22,8 +22,7 @@ from vftcli.robots.run import Run
 from vftcli.signals.errors import ReferenceTorqueError
 from vftcli.signals.recording import Recording
 
-WITHIN = 2e-4
-"""Required: the period to 0.02 %."""
+WITHIN = 2e-4  # Required: the period to 0.02 %.
 
 
 @pytest.mark.parametrize(
@@ -178,8 +177,7 @@ def test_positions_alone_tell_where_the_arm_rests(repeated):
 
 T = 0.01 * np.arange(1200)
 
-CYCLES = Cycles(period=4.0, begin=0.0, end=12.0)
-"""Three whole ones."""
+CYCLES = Cycles(period=4.0, begin=0.0, end=12.0)  # Three whole ones.
 
 MakesRun = Callable[..., Run]
 

@@ -160,8 +160,7 @@ def test_the_log_itself_is_no_free_run(circle):
         FreeMotion(log=circle, runs=(run,))
 
 
-PAYLOAD = np.array([2.8, 0.05, 0.02, 0.17])
-"""Mass and first moment. [kg, kg·m]"""
+PAYLOAD = np.array([2.8, 0.05, 0.02, 0.17])  # Mass and first moment. [kg, kg·m]
 
 
 @pytest.fixture

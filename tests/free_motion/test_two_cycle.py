@@ -29,11 +29,9 @@ from vftcli.signals.remarks import Remark
 from vftcli.simulation import Simulation, load_scenario, simulate
 
 UR5 = load_robot("ur5")
-MOVING = [0, 1, 2, 3, 5]
-"""J5 of the circle rests; it is not judged."""
+MOVING = [0, 1, 2, 3, 5]  # J5 of the circle rests; it is not judged.
 
-HONEST = (0.7, 1.4)
-"""Required: true over reported error."""
+HONEST = (0.7, 1.4)  # Required: true over reported error.
 
 
 @pytest.fixture(scope="module")
@@ -241,8 +239,7 @@ def test_pushes_are_not_taken_for_it(swing, seed):
     assert np.array_equal(friction_change(motion, tau, np.ones_like(tau, bool)), [0.0, 0.0])
 
 
-STICKS = "friction.presliding=0"
-"""The joints that the figures are required of."""
+STICKS = "friction.presliding=0"  # The joints that the figures are required of.
 SETTINGS = {name: [f"servo.stiffness={name}"] for name in ("stiff", "soft")}
 SETTINGS["drift"] = ["sensing.clock_drift=0.003"]
 

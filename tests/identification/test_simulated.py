@@ -18,8 +18,7 @@ from vftcli.signals.arrays import root_mean_squares
 from vftcli.simulation import load_scenario, simulate
 from vftcli.simulation import prepare as build
 
-STICKS = "friction.presliding=0"
-"""The numbers are required of joints that stick."""
+STICKS = "friction.presliding=0"  # The numbers are required of joints that stick.
 MISMATCH = [
     STICKS, "mismatch.mass=0.05", "mismatch.com=0.01", "mismatch.rotor_inertia=0.1",
     "mismatch.friction=0.15", "mismatch.torque_constant=0.02", "friction.stribeck=0.15",

@@ -11,8 +11,7 @@ from vftcli.simulation import load_scenario, simulate
 
 pytestmark = pytest.mark.slow
 
-WEIGHT = 9.2
-"""Weight of the bearing, Sec. IV-D. [N]"""
+WEIGHT = 9.2  # Weight of the bearing, Sec. IV-D. [N]
 
 
 def recorded(scenario):

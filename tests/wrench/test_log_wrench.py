@@ -154,8 +154,7 @@ def test_a_wrench_of_zeros_is_no_reference():
 ROBOT = load_robot("ur5e")
 TOOL_AHEAD = Mounting(tool=Pose(np.eye(3), np.array([0.02, 0.0, 0.16])))
 CONTROLLER = WrenchFrame("base", "controller")
-NOISE = 0.05
-"""Noise of the currents, as UR logs have it. [A]"""
+NOISE = 0.05  # Noise of the currents, as UR logs have it. [A]
 
 
 def pushed(point: str, force: float = 25.0, seed: int = 3) -> Recording:

@@ -229,8 +229,7 @@ STEP = 0.008
 POSE = np.array([0.3, -1.2, 1.4, -1.7, -1.5, 0.2])
 R = np.array([0.5, 0.5, 0.5, 1.3, 1.3, 1.3])
 Q_P = np.array([0.01, 0.01, 0.01, 0.02, 0.02, 0.02])
-Q_TAU = np.full(6, 5000.0)
-"""The paper's gains of the UR5, Sec. IV-A."""
+Q_TAU = np.full(6, 5000.0)  # The paper's gains of the UR5, Sec. IV-A.
 
 
 def drawn(observer: KalmanObserver, samples: int, rng: np.random.Generator):
