@@ -10,7 +10,7 @@ import pytest
 from moving_arms import FRICTION, carrying, exchanged, gravity, moving
 
 from vftcli.doctor import Examination, RobotMatch, examine, guess_robot, in_words
-from vftcli.doctor.fit import GUESSED, MAKER, MEASURED, RESIDUAL
+from vftcli.doctor.fit import GUESSED, MAKER, MEASURED, RESIDUAL, by_fit
 from vftcli.robots import PROFILES, Payload, Robot, load_robot
 from vftcli.robots.chain import flange_jacobian
 from vftcli.robots.kernels import momentum_terms
@@ -232,6 +232,12 @@ def test_profiles_within_three_tenths_of_the_best_both_fit(ratio, alike):
     assert (first.robot, first.fits) == ("panda", True)
     assert (second.robot, second.fits) == ("fr3", alike)
     assert second.misfit / first.misfit == pytest.approx(ratio, rel=1e-6)
+
+
+def test_a_profile_that_fits_goes_before_a_better_one_that_does_not():
+    better = RobotMatch("better", 0.15, fits=False, evidence=MEASURED, load=0.0)
+    fitting = RobotMatch("fitting", 0.19, fits=True, evidence=MEASURED, load=0.0)
+    assert sorted([better, fitting], key=by_fit) == [fitting, better]
 
 
 def test_signals_of_zeros_are_no_evidence():
