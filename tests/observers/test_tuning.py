@@ -15,7 +15,7 @@ from vftcli.cli import make_app
 from vftcli.observers import ObserverChoice, tuning
 from vftcli.observers.observer import Observer
 from vftcli.observers.spectra import Spectra, spectra_of
-from vftcli.observers.table import PAPER, Setup, build_observers
+from vftcli.observers.table import OBSERVERS, PAPER, LogSpectra, Setup, build_observers
 from vftcli.robots import load_robot
 from vftcli.robots.run import RunSamples
 from vftcli.signals.errors import ParameterError, VftError
@@ -210,6 +210,15 @@ def test_without_spectra_auto_falls_back_and_says_so():
     assert filtered.name == "kfo-auto"
     np.testing.assert_array_equal(filtered.tau, by_hand.tau)
     np.testing.assert_array_equal(smoothed.tau, rts.tau)
+
+
+def test_tuned_observers_have_nothing_left_to_tune():
+    setup = Setup(gains={}, settings={}, joints=2, step=STEP, as_printed=False)
+    setup = setup._replace(shown=LogSpectra(plain=spectra()))
+    observer, remarks = OBSERVERS["rts-auto"].build(setup, "rts-auto")
+    assert remarks == ()
+    assert observer.tuning(STEP, 2).parameter_count == 0
+    np.testing.assert_allclose(observer.tuning(STEP, 2).zeta, np.sqrt(0.5))
 
 
 def test_a_bound_is_never_reached_in_silence():
