@@ -3,7 +3,7 @@
 import numpy as np
 import polars as pl
 import pytest
-from seed_logs import headerless_csv, motion, parquet, table_csv
+from seed_logs import headerless_csv, motion, table_csv
 
 from vftcli.readers.columns import parse_columns
 from vftcli.readers.reader import ReadChoice
@@ -74,15 +74,6 @@ def test_wrench_by_names_carries_its_frame(path):
     recording = read(path, columns="t=t,q=q{i},wrench[base]=Fx|Fy|Fz|Mx|My|Mz")
     assert recording.wrench_frame == WrenchFrame("base", "flange")
     np.testing.assert_array_equal(recording.require("wrench")[3], [1, 2, 3, 4, 5, 3])
-
-
-def test_slices_of_list_columns(path):
-    recording, log = read(parquet(path)), motion(7)
-    assert recording.source.format == "parquet"  # its names alone give all joints
-    np.testing.assert_array_equal(recording.q, log["q"])
-    recording = read(path, columns="t=timestamp,q=observation.state[0:3],dq=dq[1:4]")
-    np.testing.assert_array_equal(recording.q, log["q"][:, :3])
-    np.testing.assert_array_equal(recording.dq, log["dq"][:, 1:4])
 
 
 def test_one_of_several_recordings(path):

@@ -42,12 +42,9 @@ def test_average_torque_is_the_mean_over_the_interval() -> None:
 @pytest.mark.parametrize("current", [None, 0.3])
 def test_noise_has_the_profiles_size_or_the_one_stated(current: float | None) -> None:
     """1001 samples: a standard deviation is good to 2.2 % (one sigma)."""
-    loud, silent = (
-        ["sensing.rate=1000", "duration=1", "sensing.position_step=0"],
-        "sensing.noise=0",
-    )
+    loud = ["sensing.rate=1000", "duration=1", "sensing.position_step=0"]
     stated = [] if current is None else [f"sensing.current_noise={current}"]
-    quiet = circle(*loud, silent, "sensing.current_noise=0")
+    quiet = circle(*loud, "sensing.noise=0", "sensing.current_noise=0")
     run, noise = circle(*loud, *stated), quiet.robot.noise
     sizes = {"q": noise.q, "dq": noise.qd, "current": noise.current}
     for name, size in (sizes | {"current": current or noise.current}).items():
