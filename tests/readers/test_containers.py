@@ -1,7 +1,6 @@
 """Arrow, JSON, MATLAB and HDF5 files: what is read of each, and what is refused by name."""
 
 import json
-import pickle
 import sys
 from pathlib import Path
 
@@ -81,15 +80,6 @@ def test_a_signal_of_neither_length_is_refused_by_name(path, shape):
         savemat(file, held | {"current": np.ones(shape)})
     with pytest.raises(LogError, match=f"t 50, q 50, current {49 if 49 in shape else 7} rows"):
         read(path)
-
-
-def test_a_pickled_clock_of_numpy_scalars_is_a_clock(path):
-    t = 0.01 * np.arange(30)
-    q = np.outer(np.sin(t), np.ones(7))
-    path.write_bytes(pickle.dumps({"time": [*t], "q": [*q]}))
-    recording = read(path)
-    np.testing.assert_array_equal(recording.t, t)
-    np.testing.assert_array_equal(recording.q, q)
 
 
 def test_lines_without_a_state_are_counted(path):

@@ -1,7 +1,6 @@
 """Hostile files: bombs, claims beyond what a file holds, and what broke a reader before."""
 
 import os
-import pickle
 import sqlite3
 import struct
 from collections.abc import Callable
@@ -243,15 +242,6 @@ def test_a_journal_beside_a_database_is_said(tmp_path):
     recording = read(tmp_path / "y.db3")
     assert recording.samples == ROWS
     assert [r.code for r in recording.source.remarks if r.level == "warning"] == ["journal-left"]
-
-
-def test_pickled_arrays_keep_their_byte_order(path):
-    """Also in the other one than most machines have."""
-    log = panda_py_log()
-    path.write_bytes(pickle.dumps({name: a.astype(">f8") for name, a in log.items()}))
-    recording = read(path)
-    np.testing.assert_array_equal(recording.q, log["q"])
-    np.testing.assert_array_equal(recording.torque, log["tau_J"])
 
 
 @pytest.mark.parametrize("make", [ur_csv, parquet, rosbag1, bare_db3, npz])

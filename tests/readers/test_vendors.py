@@ -132,9 +132,24 @@ def test_json_that_is_nested_or_endless_is_refused(path, state):
         read(path)
 
 
+def other_byte_order(path: Path) -> Path:
+    """A pickle of arrays in the byte order that most machines have not."""
+    log = seed_logs.panda_py_log()
+    path.write_bytes(pickle.dumps({name: a.astype(">f8") for name, a in log.items()}))
+    return path
+
+
+def clock_of_scalars(path: Path) -> Path:
+    log = seed_logs.panda_py_log()
+    path.write_bytes(pickle.dumps(log | {"time": [*log["time"][:, 0]], "q": [*log["q"]]}))
+    return path
+
+
 @pytest.mark.parametrize(
-    "make", [seed_logs.panda_py_npz, seed_logs.panda_py_pickle, json_arrays, json_lines]
-)
+    "make",
+    [seed_logs.panda_py_npz, seed_logs.panda_py_pickle, json_arrays, json_lines,
+     other_byte_order, clock_of_scalars],
+)  # fmt: skip
 def test_panda_pys_log_reads_the_same_in_every_container(path, make):
     recording, log = read(make(path)), seed_logs.motion(7)
     for signal in ("q", "dq"):
