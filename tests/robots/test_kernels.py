@@ -128,18 +128,6 @@ def test_a_constant_that_equals_the_number_of_a_row_is_a_constant():
     np.testing.assert_array_equal(results, [[12.0, 17.0, 22.0]])
 
 
-def test_bias_is_coriolis_less_gravity_and_programs_of_several_arms_do_not_mix():
-    q, dq = states(load_robot("ur5"), seed=12)
-    arms = [load_robot(name).chain for name in ("ur3", "ur5", "ur10", "ur3e", "ur5e", "ur10e")]
-    expected = [momentum_terms(chain, q, dq) for chain in arms]
-    for chain, terms in zip(arms, expected, strict=True):
-        ((_, velocity, (p, bias)),) = momentum_chunks(chain, q, dq, ("p", "bias"))
-        np.testing.assert_array_equal(velocity, dq)
-        np.testing.assert_array_equal(p, terms.p)
-        # one sum in another order, of torques of 10²
-        np.testing.assert_allclose(bias, terms.coriolis_transpose_dq - terms.gravity, atol=1e-12)
-
-
 def test_threads_do_not_share_what_they_work_in():
     robot = load_robot("ur5")
     logs = [states(robot, seed=20 + k, samples=4000) for k in range(4)]
@@ -166,15 +154,6 @@ def test_equals_pinocchios_regressor(name):
     # Pinocchio's rnea includes the rotors' armature
     rigid = found @ chain_parameters(robot.chain)
     np.testing.assert_allclose(rigid + robot.chain.rotor_inertia * ddq, torque, atol=1e-11)
-
-
-@pytest.mark.parametrize("name", ["ur10e", "panda"])
-def test_parameters_make_the_chain_again(name):
-    chain = load_robot(name).chain
-    again = with_parameters(chain, chain_parameters(chain), chain.rotor_inertia)
-    for key in ("mass", "com", "inertia", "rotor_inertia"):
-        # moving a tensor to the origin and back loses digits of m·c², here below 10 kg·m²
-        np.testing.assert_allclose(getattr(again, key), getattr(chain, key), atol=1e-14)
 
 
 @pytest.mark.parametrize("name", PROFILES)

@@ -67,16 +67,6 @@ def test_a_part_of_a_run_keeps_what_belongs_to_joints():
     assert part.name == run.name
 
 
-def test_a_run_less_a_torque_is_a_run_whose_disturbance_is_less_by_it():
-    """ṗ = μ + τ_ext: with μ larger by τ the disturbance is smaller by τ; the motion stays."""
-    run, torque = Run(recording=swing(), robot=UR), np.linspace(0.0, 3.0, 12000).reshape(-1, 6)
-    less = run.less(torque)
-    np.testing.assert_array_equal(less.terms.mu, run.terms.mu + torque)
-    np.testing.assert_array_equal(less.terms.p, run.terms.p)
-    assert less.recording is run.recording
-    assert less is not run
-
-
 NAMES = ("base_yaw", "shoulder_pitch", "elbow_pitch", "wrist_a", "wrist_b", "wrist_c")
 
 
