@@ -13,10 +13,8 @@ from vftcli.robots.chain import Chain
 from vftcli.robots.kernels import (
     chain_parameters,
     load_regressor,
-    momentum_chunks,
     momentum_terms,
     torque_regressor,
-    with_parameters,
 )
 from vftcli.robots.tape import Program, Tape, Value
 from vftcli.robots.terms import literal_momentum_terms
