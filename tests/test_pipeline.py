@@ -30,7 +30,7 @@ from vftcli.readers.reader import ReadChoice
 from vftcli.robots import RobotChoice
 from vftcli.robots import run as modelled
 from vftcli.robots.chain import flange_jacobian
-from vftcli.signals.errors import MissingSignalError, RobotError
+from vftcli.signals.errors import MissingSignalError
 from vftcli.signals.progress import heard_by
 from vftcli.signals.remarks import Remark
 
@@ -118,17 +118,6 @@ def test_a_fixture_goes_all_the_way_to_a_table() -> None:
     # the zero-order hold's on J1, .1 ms below kfo-fe's 38.7; 1/K of the momentum observer on J2
     assert gap.values["least_delay_ms"] == pytest.approx(38.6, abs=0.05)
     assert gap.values["most_delay_ms"] == pytest.approx(1000.0 / 3.0)
-
-
-@pytest.mark.slow
-def test_the_log_must_settle_its_robot_or_be_reported() -> None:
-    """The controller's own torques tell a UR5; currents alone settle nothing."""
-    reported = analyse_log(CIRCLE, AnalysisChoice())
-    assert reported.robot.name == "ur5"
-    assert "robot-guessed" in [remark.code for remark in reported.robot.remarks]
-    measured = ReadChoice(signals=frozenset({"dq", "current"}))
-    with pytest.raises(RobotError, match=r"^Which arm\? .*Add --robot ur"):
-        analyse_log(CIRCLE, AnalysisChoice(read=measured))
 
 
 def test_as_printed_differs_and_says_so_and_an_interval_keeps_the_logs_own_time() -> None:

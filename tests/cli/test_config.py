@@ -347,9 +347,3 @@ def test_a_missing_option_says_what_it_takes(run) -> None:
     assert code == 2
     assert "Usage: vftcli compare [OPTIONS] LOG...\n" in err
     assert "  Compare with two-cycle, sensor, vendor, zero, file.\n" in err
-
-
-def test_help_says_once_that_an_option_is_required(helped) -> None:
-    text = helped("help", "batch")
-    assert "Write here; required.\n" in text
-    assert "at most 8.\n" in text

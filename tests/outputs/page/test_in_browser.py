@@ -607,16 +607,17 @@ def test_a_long_log_reads_and_keeps_its_extremes(opened: Callable) -> None:
     long = Chart("long", "Long", ("N",), ("fx",), t, (ChartLine("best", y, leads=True),))
     html = shell.page("page.html", "A – long", [long])
     page = live(opened(html.replace("<body>", f"<body>{part('svg/multiples', long)}")))
-    ends = [place_of(page, "", t) for t in (120.0, 130.0)]
-    page.mouse.move(*ends[0])
+    box = page.locator(".box").bounding_box()
+    # Numbers take 44 pixels on the left, 10 are free on the right.
+    width, middle = box["width"] - 54, box["y"] + box["height"] / 2
+    page.mouse.move(box["x"] + 44 + 0.6 * width, middle)
     page.mouse.down()
-    page.mouse.move(*ends[1], steps=3)
+    page.mouse.move(box["x"] + 44 + 0.65 * width, middle, steps=3)
     page.mouse.up()
-    x, y = place_of(page, "", 123.456)
     # The view is 120 to 130 s now, to a pixel of 0.4 s; a stretch has 49 samples, 3 pixels.
     heads = []
     for step in range(-20, 21):
-        page.mouse.move(x + step, y)
+        page.mouse.move(box["x"] + 44 + 0.3456 * width + step, middle)
         page.wait_for_timeout(25)
         heads.append(page.locator(".head").inner_text().removesuffix(" N"))
     (spike,) = {head for head in heads if "…77" in head}
