@@ -240,7 +240,7 @@ def overshoot(x: Array, drag: Drag) -> float | None:
 def recovery_of(x: Array, drag: Drag) -> Array:
     """Deviations from a drag's release on; empty if they escape or start near zero."""
     after = x[drag.release : drag.end]
-    least = RELEASED * abs(x[drag.begin : drag.end]).max(initial=0.0)
+    least = RELEASED * abs(x[drag.begin : drag.end]).max()
     return after if np.isfinite(after).all() and abs(after[0]) > least else after[:0]
 
 

@@ -297,7 +297,6 @@ def text_of(results: Results, form: str, *, every: bool) -> str:
 def render_benchmark(results: Results, title: str, record: Record) -> str:
     """The page of a benchmark."""
     keys = ("recording", "arm", "truth", "truth_error", "licence", "source")
-    used = [key for key in keys if any(log.get(key) for log in record["logs"])]
     contact = results.numbers.filter(part="contact").partition_by("protocol", maintain_order=True)
     # The worst 10 s of `best` in every log, by the log's first protocol.
     drawn = results.table.filter(part="worst").unique("log", keep="first", maintain_order=True)
@@ -309,7 +308,7 @@ def render_benchmark(results: Results, title: str, record: Record) -> str:
         methods=[*results.colours],
         plots=[dots(own, [*results.colours]) for own in contact],
         worst=[worst_chart(row, results.colours[BEST]) for row in drawn.to_dicts()],
-        logs=keyed_grid({key: key.replace("_", " ") for key in used}, record["logs"]),
+        logs=keyed_grid({key: key.replace("_", " ") for key in keys}, record["logs"]),
         record=record,
     )
 

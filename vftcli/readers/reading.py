@@ -95,8 +95,8 @@ FORMATS = {
 
 P = ParamSpec("P")
 R = TypeVar("R")
-#: What a call declares where it wants a file.
-FILE_NAMES = (str | Path, str | Path | None)
+#: What a call declares for an argument → what it is, in words.
+KINDS = {str | None: "a text", str | Path: "a file's name", str | Path | None: "a file's name"}
 
 
 def checked_call(function: Callable[P, R]) -> Callable[P, R]:
@@ -105,7 +105,7 @@ def checked_call(function: Callable[P, R]) -> Callable[P, R]:
 
     @wraps(function)
     def called(*places: P.args, **given: P.kwargs) -> R:
-        for word in given.keys() - shown.parameters.keys():
+        for word in given.keys() - shown.parameters:
             near = did_you_mean(word, shown.parameters)
             raise ParameterError(f"{name} has no keyword {word}.{near}")
         try:
@@ -114,8 +114,8 @@ def checked_call(function: Callable[P, R]) -> Callable[P, R]:
             raise ParameterError(f"{name}: {error}") from None
         for word, value in values.items():
             kind: Any = shown.parameters[word].annotation
-            if kind in FILE_NAMES and not isinstance(value, kind):
-                raise ParameterError(f"{name}: {word} is {value!r}; expected the name of a file")
+            if kind in KINDS and not isinstance(value, kind):
+                raise ParameterError(f"{name}: {word} is {value!r}; expected {KINDS[kind]}")
         if not isinstance(values.get("settings") or {}, Mapping):
             raise ParameterError(f"{name}: settings are a dict, as {{'duration': 8}}")
         return function(*places, **given)
