@@ -205,7 +205,7 @@ MISTAKES: dict[str, tuple[str, Callable[[], object]]] = {
     "two logs": ("log is \\[", lambda: vft.contacts([CIRCLE, CIRCLE], "ur5")),
     "output": ("output is 3", lambda: vft.report(CIRCLE, "ur5", output=3)),
     "path": ("expected a file's name", lambda: vft.read(None)),
-    "columns": ("columns is 3; expected a text", lambda: vft.read("a.csv", columns=3)),
+    "columns as a number": ("columns is 3; expected a text", lambda: vft.read("a.csv", columns=3)),
     "columns": ("no column", lambda: vft.read(CIRCLE, columns="q=foo*")),
     "columns of an object": ("read already", lambda: vft.contacts(RECORDING, columns="q=a*")),
     "interval": ("is not A:B", lambda: vft.contacts(CIRCLE, "ur5", interval=(0, 4))),
