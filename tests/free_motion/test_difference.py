@@ -212,6 +212,15 @@ def test_phase_finds_the_place_up_to_a_tenth_of_a_second_away(drive_of, late, mo
     np.testing.assert_allclose(times[middle], CLOCK[middle] - moved, atol=1e-4)
 
 
+def test_a_run_is_laid_by_shift_and_rate_as_far_as_it_goes(drive_of):
+    pairing = pair_with_run(
+        CLOCK, drive_of(CLOCK, np.column_stack([CLOCK]), np.ones((600, 1))), 1.0, 1.1
+    )
+    known = CLOCK[-1] >= 1.1 * CLOCK + 1.0
+    np.testing.assert_array_equal(pairing.known, known)
+    np.testing.assert_allclose(pairing.times[known], 1.1 * CLOCK[known] + 1.0)
+
+
 def test_no_partner_is_made_up_in_a_gap(drive_of):
     """Six steps without a sample are a gap, five are interpolated across."""
     keep = np.ones(len(CLOCK), bool)

@@ -53,6 +53,17 @@ def cost(logs: np.ndarray, f: np.ndarray, P: np.ndarray) -> float:
     return float(np.sum(np.log(S) + P / S) + 0.5 * ((logs[2] - np.log(0.5)) / 1.5) ** 2)
 
 
+@pytest.mark.parametrize(("sd", "time"), [(2.0, 0.5), (3.0, 4.0)])
+def test_a_drawn_process_is_found_again(sd, time):
+    """20 000 blocks: 2000 s of T ≤ 4 s fix s² to √(2·4/2000) = 6 % and T to about twice that."""
+    d = wandering(20_000, sd, time, 1) + 0.3 * np.random.default_rng(2).standard_normal(20_000)
+    f = np.fft.rfftfreq(len(d), SECONDS)[1:]
+    found = fit_spectrum(f, periodogram(d[:, None], SECONDS)[:, 0], SECONDS, 2000.0)
+    assert found[0] == pytest.approx(0.09, rel=0.15)
+    assert np.sqrt(found[1]) == pytest.approx(sd, rel=0.1)
+    assert found[2] == pytest.approx(time, rel=0.2)
+
+
 @pytest.mark.parametrize("seed", range(4))
 def test_no_other_optimiser_finds_a_likelier_noise(seed):
     """Nelder–Mead from the truth on 500 blocks; the grid's last step leaves under .2 nats."""
