@@ -234,7 +234,6 @@ def test_the_wrong_robot_is_refused(name, error):
 @pytest.mark.parametrize(
     ("options", "match"),
     [
-        ({"method": "magic"}, "friction, base, targets"),
         ({"method": "targets", "friction": False}, "leave model.friction=none out"),
         ({"method": "base", "constants": True}, "--method friction"),
         ({"cutoff": 0.0}, "it must be positive"),

@@ -77,7 +77,7 @@ def test_any_wrench_option_asks_for_the_wrench(tmp_path, option, asks):
     [
         (("--frame", "wrist"), "no frame 'wrist' for a wrench; there is flange"),
         (("--frame", "tool"), "the robot has no tool"),
-        (("--set", "virtual-sensor.solver=svd"), "no solver 'svd' for a wrench; there is smoo"),
+        (("--set", "virtual-sensor.solver=svd"), "virtual-sensor.solver=svd; there is smoother"),
         (("--zero", "500:600"), "is outside the log"),
         (("--frame", "sensor", "--set", "virtual-sensor.sensor=0,0,0,2"), "three or six"),
     ],
