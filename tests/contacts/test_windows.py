@@ -1,41 +1,79 @@
-"""How hard: splitting, and the prior that is learned from the contacts."""
+"""Where and how hard: the place that a torque tells, and the prior learned from the contacts."""
 
 import numpy as np
 import pytest
 from drawn_blocks import B, blocks, noise
 
-from vftcli.contacts.search import split_at_turns, split_run
 from vftcli.contacts.windows import (
     START,
-    WindowWrench,
+    arm_parts,
     contact_lanes,
     learn_prior,
     likelihoods,
+    point_fits,
     smooth_lanes,
 )
+from vftcli.robots import load_robot
+from vftcli.robots.chain import link_jacobian, link_poses
 from vftcli.signals.arrays import covered
 from vftcli.wrench.model_error import ErrorProcess, TorqueNoise, error_process
 from vftcli.wrench.smoother import BlockLog, Lane, in_blocks
 
+Q = np.array([0.3, -1.2, 1.6, -1.9, -1.4, 0.5])
 
-@pytest.mark.parametrize(
-    ("pause", "force", "sd", "felt", "pieces"),
-    [
-        (6, 0.5, 2.0, 0.0, [(0, 10), (16, 26)]),
-        (2, 0.5, 2.0, 0.0, [(0, 22)]),  # a hand that slips for a moment has not let go
-        (6, 0.5, 2.0, 20.0, [(0, 26)]),  # the force turns while the joints feel it
-        (6, 10.0, 20.0, 0.0, [(0, 26)]),  # noise hides the force
-    ],
-)
-def test_two_pushes_are_split_where_force_and_torque_pause(pause, force, sd, felt, pieces):
-    """Ten blocks of 30 N and ten of 40 N along x; joint 1 feels the force, joint 4 so much more."""
-    size = [30.0] * 10 + [force] * pause + [40.0] * 10
-    count = len(size)
-    values = np.tile([0.0, 0.0, 0.0, felt, 0.0, 0.0], (count, 1))
-    values[:, 0] = size
-    wrench = WindowWrench(0, values, np.tile(np.eye(6) * sd**2 / 3.0, (count, 1, 1)))
-    found = split_run(B * np.arange(count), wrench, (0, count), np.tile(np.eye(6), (count, 1, 1)))
-    assert found == pieces
+
+@pytest.mark.parametrize("link", [2, 3, 4])
+def test_a_points_jacobian_is_how_it_moves(link):
+    """Against Pinocchio's Jacobian of a frame at the same point."""
+    import pinocchio as pin
+
+    robot = load_robot("ur5")
+    model = robot.chain.to_pinocchio()
+    half = 0.5 * np.array(robot.chain.translation[link])
+    frame = pin.Frame("point", link, pin.SE3(np.eye(3), half), pin.FrameType.OP_FRAME)
+    number = model.addFrame(frame)
+    data, axes = model.createData(), pin.LOCAL_WORLD_ALIGNED
+    exact = pin.computeFrameJacobian(model, data, Q, number, axes)
+    found = link_jacobian(link_poses(robot.chain, Q[None]), link, 0.5)[0]
+    np.testing.assert_allclose(found, exact, atol=1e-12)
+
+
+def test_every_link_belongs_to_a_part():
+    assert [arm_parts(6)[k] for k in range(7)] == [
+        "wrist", "upper arm", "upper arm", "forearm", "wrist", "wrist", "wrist",
+    ]  # fmt: skip
+    assert [arm_parts(7)[k] for k in (3, 4, 5, 6, 7)] == [
+        "upper arm", "forearm", "forearm", "wrist", "wrist",
+    ]  # fmt: skip
+
+
+def test_a_force_on_the_forearm_is_distinct_from_one_on_the_flange():
+    chain = load_robot("ur5").chain
+    force = np.array([20.0, -40.0, 30.0])
+    for link, share in ((3, 0.5), (6, 1.0)):
+        torque = link_jacobian(link_poses(chain, Q[None]), link, share)[0, :3].T @ force
+        fits = point_fits(chain, Q, torque, np.full(6, 0.05))
+        assert fits[0].misfit < 1.0
+        # The prior of 100 N draws by (sd over lever over 100)², a millionth.
+        assert link in {fit.link for fit in fits}
+        best = next(fit for fit in fits if (fit.link, fit.share) == (link, share))
+        np.testing.assert_allclose(best.force, force, rtol=1e-2)
+        assert best.size == pytest.approx(np.linalg.norm(force), rel=1e-2)
+    parts = {arm_parts(6)[fit.link] for fit in fits}
+    assert parts == {"wrist"}
+
+
+def test_a_force_and_its_band_are_drawn_to_zero_by_the_prior_of_100_N():
+    """Against least squares with three more rows, 0 = F/100, for torques of 30 N·m sd."""
+    chain, sd = load_robot("ur5").chain, 30.0
+    torque = np.array([10.0, -60.0, -30.0, 20.0, 5.0, 0.0])
+    for fit in point_fits(chain, Q, torque, np.full(6, sd)):
+        J = link_jacobian(link_poses(chain, Q[None]), fit.link, fit.share)[0, :3].T
+        rows, values = np.vstack([J / sd, np.eye(3) / 100.0]), np.append(torque / sd, np.zeros(3))
+        np.testing.assert_allclose(fit.force, np.linalg.lstsq(rows, values)[0], rtol=1e-9)
+        # The size's variance is |rows⁺ᵀ u|², u the force's direction.
+        along = np.linalg.pinv(rows).T @ (fit.force / fit.size)
+        assert fit.band == pytest.approx(1.96 * np.linalg.norm(along), rel=1e-9)
 
 
 def known_noise(variance: float) -> TorqueNoise:
@@ -95,22 +133,3 @@ def test_two_blocks_say_what_all_quiet_ones_beside_a_contact_do():
         short, long = (one.within(run) for one in smooth_lanes(each, [START] * 2))
         np.testing.assert_allclose(short.values, long.values, rtol=1e-7, atol=1e-7)
         np.testing.assert_allclose(short.covariance, long.covariance, rtol=1e-6, atol=1e-7)
-
-
-def test_pushes_from_different_sides_are_two_contacts():
-    t = B * np.arange(200)
-    force = np.zeros((200, 3))
-    force[:100, 0] = 40.0 * np.sin(np.pi * np.arange(100) / 100)
-    force[100:, 1] = 40.0 * np.sin(np.pi * np.arange(100) / 100)
-    load = 0.5 * np.linalg.norm(force, axis=1)
-    (first, second) = split_at_turns(t, force, load, (0, 200))
-    assert first[1] == second[0] == pytest.approx(100, abs=1)
-    # From one side, or where the joints are loaded all the while, it is one.
-    same = np.roll(force[:, ::-1], 0, axis=1).copy()
-    same[:, 0] = np.linalg.norm(force, axis=1)
-    same[:, 1:] = 0.0
-    assert split_at_turns(t, same, load, (0, 200)) == [(0, 200)]
-    assert split_at_turns(t, force, np.full(200, 20.0), (0, 200)) == [(0, 200)]
-    # A hand that has just begun is none of its own.
-    brief = force[94:]
-    assert split_at_turns(t[94:], brief, load[94:], (0, 106)) == [(0, 106)]

@@ -1,4 +1,4 @@
-"""Where a contact may be: the two-state filter and the threshold."""
+"""Where a contact may be: the two-state filter, the threshold, and where contacts are split."""
 
 import numpy as np
 import pytest
@@ -10,9 +10,12 @@ from vftcli.contacts.search import (
     PUSH,
     SEARCHES,
     filtered_contacts,
+    split_at_turns,
+    split_run,
     turned_round,
     two_state_odds,
 )
+from vftcli.contacts.windows import WindowWrench
 from vftcli.robots.terms import Blocks
 from vftcli.signals.arrays import Array
 from vftcli.signals.estimation import SPIKE
@@ -137,3 +140,42 @@ def test_behind_a_gap_of_an_hour_the_odds_are_those_of_a_log_that_begins():
     courses = both_ways(log)
     for each in two_state_odds(log, courses, np.full((300, 1), 15.0)):
         assert all(np.isfinite(odds).all() and odds[[145, 299]].max() < 0.0 for odds in each)
+
+
+@pytest.mark.parametrize(
+    ("pause", "force", "sd", "felt", "pieces"),
+    [
+        (6, 0.5, 2.0, 0.0, [(0, 10), (16, 26)]),
+        (2, 0.5, 2.0, 0.0, [(0, 22)]),  # a hand that slips for a moment has not let go
+        (6, 0.5, 2.0, 20.0, [(0, 26)]),  # the force turns while the joints feel it
+        (6, 10.0, 20.0, 0.0, [(0, 26)]),  # noise hides the force
+    ],
+)
+def test_two_pushes_are_split_where_force_and_torque_pause(pause, force, sd, felt, pieces):
+    """Ten blocks of 30 N and ten of 40 N along x; joint 1 feels the force, joint 4 so much more."""
+    size = [30.0] * 10 + [force] * pause + [40.0] * 10
+    count = len(size)
+    values = np.tile([0.0, 0.0, 0.0, felt, 0.0, 0.0], (count, 1))
+    values[:, 0] = size
+    wrench = WindowWrench(0, values, np.tile(np.eye(6) * sd**2 / 3.0, (count, 1, 1)))
+    found = split_run(B * np.arange(count), wrench, (0, count), np.tile(np.eye(6), (count, 1, 1)))
+    assert found == pieces
+
+
+def test_pushes_from_different_sides_are_two_contacts():
+    t = B * np.arange(200)
+    force = np.zeros((200, 3))
+    force[:100, 0] = 40.0 * np.sin(np.pi * np.arange(100) / 100)
+    force[100:, 1] = 40.0 * np.sin(np.pi * np.arange(100) / 100)
+    load = 0.5 * np.linalg.norm(force, axis=1)
+    (first, second) = split_at_turns(t, force, load, (0, 200))
+    assert first[1] == second[0] == pytest.approx(100, abs=1)
+    # From one side, or where the joints are loaded all the while, it is one.
+    same = np.roll(force[:, ::-1], 0, axis=1).copy()
+    same[:, 0] = np.linalg.norm(force, axis=1)
+    same[:, 1:] = 0.0
+    assert split_at_turns(t, same, load, (0, 200)) == [(0, 200)]
+    assert split_at_turns(t, force, np.full(200, 20.0), (0, 200)) == [(0, 200)]
+    # A hand that has just begun is none of its own.
+    brief = force[94:]
+    assert split_at_turns(t[94:], brief, load[94:], (0, 106)) == [(0, 106)]
