@@ -132,6 +132,7 @@ def test_what_touches_a_loaded_arm_comes_before_its_load(pushed: Analysis) -> No
     load = replace(first, is_load=True, start=0.0, stop=20.0)
     rows = staged(listing(pushed, load, *rest))["contacts"]
     assert [row["number"] for row in rows] == [*range(2, 13), 1]
+    assert [row["weak"] for row in rows] == [each.trust == "weak" for each in (*rest, load)]
 
 
 def test_few_joints_have_contacts_without_a_force(pushed: Analysis) -> None:
