@@ -15,12 +15,12 @@ TUNINGS = {o.name: o.tuning(STEP, 6) for o in OBSERVERS}
 
 
 def errors(scale: float = 1.0, joints: int = 6) -> pl.DataFrame:
-    """The printed numbers times a scale, FDO and GMO equal on J4–J6."""
+    """The printed numbers times a scale, FDO and GMO equal on J4–J6; a floor of .1 N·m a joint."""
     rows = []
     for name in ("fdo", "gmo", "kfo-fe"):
         for j in range(joints):
             printed = TABLE_1.rmse["fdo" if name == "gmo" and j > 2 else name][min(j, 5)]
-            rows.append(("log", name, j + 1, scale * printed, 0.4))
+            rows.append(("log", name, j + 1, scale * printed, 0.1 * (j + 1)))
     columns = ["recording", "observer", "joint", "rmse_Nm", "reference_floor_Nm"]
     return pl.DataFrame(rows, schema=columns, orient="row")
 
@@ -37,7 +37,9 @@ def test_sizes_and_winners_are_reported() -> None:
     assert found_sizes == pytest.approx([1.5, 1.5, 1.5 * ratios.max()])
     # J6 of all four in print, and the reference's own error there
     floor = by_code["print-noise-floor"]
-    assert [floor[k] for k in ("least_Nm", "most_Nm", "floor_Nm")] == [0.9322, 0.9443, 0.4]
+    sizes = [floor[k] for k in ("least_Nm", "most_Nm", "floor_Nm")]
+    assert sizes == pytest.approx([0.9322, 0.9443, 0.6])
+    assert found.floor == pytest.approx([0.1, 0.2, 0.3, 0.4, 0.5, 0.6])
     # FDO, GMO and KFO: of them another one is best on J4 alone
     other = by_code["print-other-best"]
     assert (other["joints"], other["same"]) == (6, 6 - len(other["differing"]))
