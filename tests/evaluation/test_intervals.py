@@ -72,6 +72,14 @@ def ring(squares: Array, length: int) -> Array:
     return np.asarray(squares[inside].mean(axis=(1, 2)))
 
 
+@pytest.mark.parametrize(("length", "blocks"), [(1, 30), (7, 4), (8, 4), (30, 1)])
+def test_draws_are_means_of_blocks_of_the_ring(length: int, blocks: int) -> None:
+    squares = np.random.default_rng(9).standard_normal((30, 2)) ** 2
+    found = resample(squares, length)
+    assert found.blocks == blocks
+    np.testing.assert_allclose(found.draws, ring(squares, length), rtol=1e-9)
+
+
 def test_a_pair_s_interval_is_of_the_differences_drawn() -> None:
     """White errors of 900 samples: blocks of a 300th; the 2.5 % and 97.5 % of 1000 draws."""
     first, second = np.random.default_rng(4).standard_normal((2, 900))

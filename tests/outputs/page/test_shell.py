@@ -177,6 +177,9 @@ def test_a_scale_holds_ribbons_and_bands_and_neighbours_of_one_drive_size_share_
     assert shown.ends(0).high > 40.0
     assert shown.ends(2).high < 4.0
     ones = np.ones((2, 1))
+    # Lines that are constant or unknown have no scale of their own.
+    flat = (chart(t, ChartLine("a", x * ones)).ends(0) for x in (4.0, 0.0, np.nan))
+    assert [*flat] == [Span(0.0, 8.0), Span(-1.0, 1.0), Span(-1.0, 1.0)]
     ends = chart(t, ChartLine("a", ones, half=5.0 * ones)).ends(0)
     assert (ends.low < -4.0, ends.high > 6.0) == (True, True)
     ends = chart(t, ChartLine("a", ones), band=np.array([9.0])).ends(0)
