@@ -105,6 +105,16 @@ def table(path: Path, clock: Callable[[int], float], rows: int = ROWS) -> Path:
     return path
 
 
+def crowded_json(path: Path) -> Path:
+    path.write_bytes(b'{"q": [' + b"[]," * (8 << 20) + b"[]]}")  # which would be .8 GB
+    return path
+
+
+def claiming_pickle(path: Path) -> Path:
+    path.write_bytes(b"\x80\x02cnumpy\nndarray\n((I10000000000\ntt R.")  # ndarray((10**9,))
+    return path
+
+
 def damaged_chunk(path: Path) -> Path:
     content = bytearray(bare_mcap(path).read_bytes())
     content[3000] ^= 1
@@ -157,6 +167,8 @@ def test_nothing_is_written_beside_a_log(tmp_path):
     ("make", "words"),
     [
         (lambda path: patched(rosbag1(path, compression="LZ4"), b"size=", b"\xff" * 4), TOO_MUCH),
+        (crowded_json, "a JSON document of 24 MiB, too many values to hold"),
+        (claiming_pickle, "Pickles are opened only"),
         (damaged_chunk, "a chunk does not match its checksum; damaged"),
         (long_document, "message 2 of /j is damaged (nested or long"),
         (computed_beside, "does not fit the definition"),  # the message itself was reached
@@ -181,7 +193,7 @@ def test_nothing_is_written_beside_a_log(tmp_path):
         (lambda path: table(path, lambda k: k % 100), "the clock restarts"),
     ],
 )
-def test_what_is_no_log_are_refused_by_what_is_wrong(path, make, words):
+def test_what_is_no_log_is_refused_by_what_is_wrong(path, make, words):
     with pytest.raises(VftError) as refusal:
         read(make(path))
     assert words in str(refusal.value)
