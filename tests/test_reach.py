@@ -23,7 +23,7 @@ from vftcli.robots import RobotChoice, load_robot
 from vftcli.robots.kernels import momentum_terms
 from vftcli.robots.run import paired
 from vftcli.robots.terms import gravity_torque
-from vftcli.signals.errors import LogError
+from vftcli.signals.errors import ExaminationError, LogError
 from vftcli.signals.recording import Recording
 
 DEGREES = "t=t,q[deg]=q{i},dq[deg]=dq{i},-tau=tau{i}"
@@ -169,6 +169,18 @@ def test_an_arm_is_laid_on_its_log_by_name(samples: Path) -> None:
     reach = samples / "reach"
     # By position 19.3 N·m are left.
     assert free_torque(reach / "arm_with_gripper_bag", reach / "arm_with_gripper.urdf") < 0.6
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "columns", "words"), [
+    ("ros2_ur_effort_torque", None, "torque-without-gravity.*--set log.effort=torque-with"),
+    ("ros2_ur_effort_full_torque", None, "current-as-torque.*--set log.effort=torque"),
+    ("ur5_degrees_turned.csv", DEGREES.replace("-tau", "tau"), "effort-sign.*-tau"),
+    ("ur5_degrees_turned.csv", "q[deg]=q{i},-tau=tau{i}", "velocity-unit.*deg/s"),
+])  # fmt: skip
+def test_what_is_not_what_it_is_called_is_refused_with_its_remedy(samples, name, columns, words):
+    with pytest.raises(ExaminationError, match=words):
+        free_torque(samples / "reach" / name, columns=columns)
 
 
 UR10E = "t,q:6,dq:6,current:6"

@@ -123,7 +123,8 @@ def test_the_free_part_is_the_first_round_and_nothing_is_claimed(pushed: Analysi
     assert stage.free_spans(guessed) == stage.free_spans(without) == []
     data = staged(without)
     assert (data["contacts"], data["none"]) == ([], ("–", "", ""))
-    assert staged(pushed)["none"] == ("< 2 N", "", "no contact")
+    whole = staged(pushed)
+    assert (whole["none"], whole["wrench"]) == (("< 2 N", "", "no contact"), {"flange": True})
     assert staged(guessed)["none"] == ("–", "", "no contact listed")
 
 
