@@ -303,15 +303,12 @@ def test_the_number_of_joints_is_known_without_the_file():
     assert {name: load_robot(name).joints for name in PROFILES} == NAMES
 
 
-def test_friction_can_be_left_away():
+def test_friction_can_be_left_away_and_another_is_refused_before_a_log_is_read():
     assert any(f.model != "none" for f in RobotChoice(name="ur5").load(log()).friction)
     without = RobotChoice.parsed(robot="ur5", settings={"model.friction": "none"}).load(log())
     assert all(f.model == "none" for f in without.friction)
-
-
-def test_another_friction_is_refused_before_a_log_is_read():
     with pytest.raises(ParameterError, match=r"model\.friction=lugre; there is profile, none"):
-        RobotChoice(friction="lugre")
+        RobotChoice.parsed(settings={"model.friction": "lugre"})
 
 
 def test_a_payload_that_the_file_has_not_is_refused():
