@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pyarrow as pa
 import pytest
+import zstandard
 from message_mutants import bag_bytes, bag_records, mcap_records
 from pyarrow.parquet import write_table
 from seed_logs import (
@@ -105,13 +106,18 @@ def table(path: Path, clock: Callable[[int], float], rows: int = ROWS) -> Path:
     return path
 
 
+def packed_text(path: Path) -> Path:
+    path.write_bytes(zstandard.compress(b"t,q1\n" + b"0.1,0.2\n" * (17 << 20)))  # 136 MiB
+    return path
+
+
 def crowded_json(path: Path) -> Path:
     path.write_bytes(b'{"q": [' + b"[]," * (8 << 20) + b"[]]}")  # which would be .8 GB
     return path
 
 
 def claiming_pickle(path: Path) -> Path:
-    path.write_bytes(b"\x80\x02cnumpy\nndarray\n((I10000000000\ntt R.")  # ndarray((10**9,))
+    path.write_bytes(b"\x80\x02cnumpy\nndarray\n((I10000000000\nttR.")  # ndarray((10**9,))
     return path
 
 
@@ -167,6 +173,7 @@ def test_nothing_is_written_beside_a_log(tmp_path):
     ("make", "words"),
     [
         (lambda path: patched(rosbag1(path, compression="LZ4"), b"size=", b"\xff" * 4), TOO_MUCH),
+        (packed_text, TOO_MUCH),
         (crowded_json, "a JSON document of 24 MiB, too many values to hold"),
         (claiming_pickle, "Pickles are opened only"),
         (damaged_chunk, "a chunk does not match its checksum; damaged"),
