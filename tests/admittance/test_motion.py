@@ -52,6 +52,17 @@ def test_equal_axes_turn_about_the_start_s_own_axis():
     np.testing.assert_allclose(along, straight.x[:, 0, 3], atol=1e-12)  # 500 steps of ulp
 
 
+def test_an_axis_recovers_whatever_drags_another():
+    """Damping and swelling are each axis's own."""
+    start, shape = np.array([0.0, 0.2, 0.0, 0.0, 0.0, 0.0]), (250, 6)
+    force, dragged = np.zeros(shape), np.zeros(shape, bool)
+    force[:, 0], dragged[:, 0] = 30.0, True
+    both = run([variable(UR5)], force, dragged, start)
+    alone = release([variable(UR5)], start, 250 * UR5.period)
+    assert both.x[-1, 0, 0] > 0.1
+    np.testing.assert_array_equal(both.x[:, 0, 1], alone.x[:, 0, 1])
+
+
 def panda(mode: str = "hard", hysteresis: float = 0.0) -> Admittance:
     """Thresholds 4, 4, 15 N and 2 N·m, the Panda's."""
     profile = from_table(load_robot("panda").admittance, "panda", {})
@@ -129,3 +140,5 @@ def test_overshoot_is_to_the_other_side_and_a_share_of_the_release():
     assert overshoot(-x, RELEASE) == pytest.approx(0.2)
     assert overshoot(np.abs(x), RELEASE) == 0.0
     assert overshoot(np.zeros(101), RELEASE) is None
+    x[10] = 10.0  # shares of what is left at the release say nothing
+    assert overshoot(x, RELEASE) is return_time(T, x, RELEASE, 0.1) is None

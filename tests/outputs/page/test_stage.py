@@ -134,6 +134,7 @@ def test_what_touches_a_loaded_arm_comes_before_its_load(pushed: Analysis) -> No
     rows = staged(listing(pushed, load, *rest))["contacts"]
     assert [row["number"] for row in rows] == [*range(2, 13), 1]
     assert [row["weak"] for row in rows] == [each.trust == "weak" for each in (*rest, load)]
+    assert [row["size"] for row in rows] == [round(each.peak_force, 2) for each in (*rest, load)]
 
 
 def test_few_joints_have_contacts_without_a_force(pushed: Analysis) -> None:
