@@ -356,7 +356,7 @@ ROWS = [
     Row("give one of LOG, SCENARIO, --release", lambda _: ["admit", "--robot", "ur5"],
         "--release", "x=0.3"),
     Row("are of what -o DIR writes", lambda _: [*RELEASE, "--figures", "svg"], "-o", "out"),
-    Row("choose one of --json and --latex", lambda _: [*RELEASE, "--json", "--latex"], "--latex",
+    Row("choose one of --json, --latex", lambda _: [*RELEASE, "--json", "--latex"], "--latex",
         LEFT_OUT),
     Row("s force drives the replay", on(same, "admit", *GMO, "--observer", "kfo-zoh"),
         "--observer", "gmo"),

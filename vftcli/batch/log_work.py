@@ -31,7 +31,7 @@ from vftcli.readers.opening import files_of
 from vftcli.readers.reading import Library
 from vftcli.readers.references import refuse_estimates
 from vftcli.signals.arrays import Array, root_mean_square
-from vftcli.signals.errors import LogError
+from vftcli.signals.errors import LogError, ParameterError
 from vftcli.signals.option import FILE
 from vftcli.signals.packages import VERSION
 from vftcli.signals.parsing import check_known
@@ -119,6 +119,8 @@ class LogJob:
 
     def __post_init__(self) -> None:
         check_known(self.do, COMMANDS, f"--do {self.do!r}")
+        if self.written.extras and self.do in {"compare", "contacts"}:
+            raise ParameterError(f"--do {self.do} writes no estimates; leave --csv, --mcap out")
 
 
 class LogTask(NamedTuple):

@@ -40,7 +40,7 @@ class Baseline:
     load: FreeLoad | None = None
     #: The whole log's bias, off the terms; None if none was fitted.
     correction: WholeLogBias | None = None
-    #: Whether the free part is that bias's fit's: no passing contacts, perhaps a lasting load.
+    #: Whether the bias's fit found the free part: a lasting load may be in it.
     by_fit: bool = False
     #: Its parts in use, those not in use, and the substitute for a free part.
     on_correction: tuple[Remark, ...] = ()

@@ -52,8 +52,7 @@ def admit(
         raise typer.BadParameter("give one of LOG, SCENARIO, --release AXIS=VALUE")
     if output is None and (show_made or figures):
         raise typer.BadParameter("--open and --figures are of what -o DIR writes; give -o too")
-    if json and latex:
-        raise typer.BadParameter("choose one of --json and --latex")
+    opt.form_of(asked)
     names = files_of_replay(figures)
     if output is not None:
         OutputFolder(output, force, names).check()

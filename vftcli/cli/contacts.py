@@ -2,8 +2,6 @@
 
 from typing import TYPE_CHECKING, Annotated
 
-import typer
-
 from vftcli.cli import options as opt
 from vftcli.cli.console import LeftOut, canvas, echo, echo_data, say_analysis
 from vftcli.evaluation import ReferenceChoice
@@ -34,15 +32,11 @@ def list_contacts(logs: opt.Logs, asked: Asked) -> None:
 
     Example: vftcli contacts fixtures/ur5_circle.csv --robot ur5 --free 0.3:4
     """
-    json, csv = asked.words["json"], asked.words["csv"]
-    if json and csv:
-        raise typer.BadParameter("choose one of --json, --csv")
-
     from vftcli.pipeline import analyse, analyse_logs, list_touches
     from vftcli.readers.reading import Library
 
     library = Library(logs)
-    choice = opt.choice_for(asked, library, on_screen=not (json or csv))
+    choice = opt.choice_for(asked, library, on_screen=opt.form_of(asked) == "terminal")
     left_out, found = LeftOut(library, logs), []
     work = analyse if choice.reference else list_touches
     for made in analyse_logs(logs, choice, left_out.add, work):

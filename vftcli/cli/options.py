@@ -126,8 +126,8 @@ class TableForm(Choice):
 
 
 def form_of(asked: Asked) -> str:
-    """The one form of a table asked for, or "terminal"."""
-    forms = [name for name in TableForm.options() if asked.words[name]]
+    """The one form asked for, or "terminal"."""
+    forms = [name for name in ("json", "csv", "markdown", "latex") if asked.words.get(name)]
     if len(forms) > 1:
         raise typer.BadParameter(f"choose one of {', '.join(f'--{name}' for name in forms)}")
     return forms[0] if forms else "terminal"

@@ -155,7 +155,7 @@ class Examiner:
         tell: Callable[[Examination], None] | None = None,
     ) -> None:
         self.anyway, self._fitting, self._tell = anyway, fitting, tell
-        #: The runs of the command, by their recording's and robot's identities, and `literal`.
+        #: The command's runs, by identity of recording and robot, and `literal`.
         self.runs: dict[tuple[int, int, bool], Run] = {}
         self._made: list[tuple[Recording, Robot, Examination]] = []
         self._robots: dict[tuple[str, RobotChoice, float | None, bool], Robot] = {}

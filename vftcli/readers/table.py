@@ -225,7 +225,7 @@ def require_positions(table: Table, picks: Picks) -> None:
         )
 
 
-#: Bytes of a signal that wait in memory; a longer one is an array in a nameless temporary file.
+#: Bytes of a signal in memory; a longer one is in a nameless temporary file.
 HELD = 1 << 23
 
 
@@ -282,7 +282,7 @@ class JoinedRows:
 
 def numbers_of(values: Arrow) -> Column:
     """A column of Arrow's numbers; NaN for what is missing. (T,)"""
-    # Pyarrow's own way imports pandas (50 MB, half a second); it has NaN for what is missing.
+    # Pyarrow's own way imports pandas: 50 MB, half a second.
     if values.null_count or values.type.bit_width < 8:
         return np.asarray(values.to_numpy(zero_copy_only=False))
     return np.from_dlpack(values)
