@@ -22,7 +22,7 @@ def batch(folder: Path, sizes: list[int], jobs: int | None, **more: int) -> Batc
         logs.append(LogEntry(path=path, files=(path,), **more))
     return BatchRun(
         logs=logs,
-        job=LogJob(do="estimate", choice=AnalysisChoice(), anyway=False, written=()),
+        job=LogJob(do="estimate", choice=AnalysisChoice(), anyway=False),
         folder=BatchFolder(folder / "out"),
         workers=WorkersChoice(jobs=jobs),
         command="",
