@@ -168,7 +168,7 @@ class FreeReading(NamedTuple):
 
     observer: Observer  #: The observer.
     estimate: ExternalTorque  #: Its estimate of the log.
-    #: Its reading in the free samples of all pieces, less the free part's load. (S, n) [N·m]
+    #: Its reading in all free samples, less the free part's load. (S, n) [N·m]
     samples: Array
     resting: Mask  #: Whether a joint rests in them. (S, n)
 

@@ -92,7 +92,7 @@ class Ground(NamedTuple):
 
 
 class LogSummary(NamedTuple):
-    """One log among several; its fields up to `detectable_N` are columns of a batch's table."""
+    """One log among several; fields up to `detectable_N` are columns of a batch's table."""
 
     log: str  #: Its label.
     robot: str
