@@ -55,15 +55,27 @@ def test_a_robot_is_loaded_once_and_guessed_where_the_makers_model_tells_it():
     assert "robot-guessed" in [remark.code for remark in guessed.remarks]
     with pytest.raises(RobotError, match=r"^Which arm\? Best fits: ur5e \(.* Add --robot ur5e$"):
         examiner.robot(log, RobotChoice())
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("turns", "reason"),
+    [
+        (True, ": the torque of .* has its sign turned .* a leading minus"),
+        (False, "; nearest is .* --robot FILE"),
+    ],
+)
+def test_a_log_of_no_profile_is_refused_by_its_cause(turns: bool, reason: str) -> None:
+    log = excited()
     unlike = np.random.default_rng(1).normal(0.0, 30.0, log.q.shape)
-    for other, reason in (
-        (turned(log), ": the torque of .* has its sign turned .* a leading minus"),
-        (replace(log, torque=unlike), "; nearest is .* --robot FILE"),
-    ):
-        with pytest.raises(RobotError, match=rf"^Which arm\? No profile fits{reason}"):
-            examiner.robot(other, RobotChoice())
+    other = turned(log) if turns else replace(log, torque=unlike)
+    with pytest.raises(RobotError, match=rf"^Which arm\? No profile fits{reason}"):
+        Examiner().robot(other, RobotChoice())
+
+
+def test_positions_alone_name_no_arm() -> None:
     with pytest.raises(MissingSignalError, match="positions alone carry no force; it has q, dq"):
-        examiner.robot(replace(log, torque=None), RobotChoice())
+        Examiner().robot(replace(excited(), torque=None), RobotChoice())
 
 
 def test_the_payload_of_one_log_is_not_that_of_another():
