@@ -110,6 +110,13 @@ def test_workers_are_processes_with_one_thread_a_library() -> None:
     assert all(f":{os.getpid()}" not in outcome.effort.place for outcome in ended)
 
 
+@pytest.mark.slow
+def test_an_interrupt_ends_no_worker() -> None:
+    """A terminal sends it to every process; the main one ends the others."""
+    ended = run_tasks([(signal.SIGINT,)], signal.raise_signal, WorkersChoice(jobs=1), silent)
+    assert [outcome.failure for outcome in ended] == [None]
+
+
 class Losing:
     """A client of a cluster of two workers that loses them: what `Workers` sees of one."""
 
