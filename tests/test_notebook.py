@@ -205,6 +205,7 @@ MISTAKES: dict[str, tuple[str, Callable[[], object]]] = {
     "two logs": ("log is \\[", lambda: vft.contacts([CIRCLE, CIRCLE], "ur5")),
     "output": ("output is 3", lambda: vft.report(CIRCLE, "ur5", output=3)),
     "path": ("expected a file's name", lambda: vft.read(None)),
+    "arm": ("--arm middle; there is left, right", lambda: vft.read(CIRCLE, arm="middle")),
     "columns as a number": ("columns is 3; expected a text", lambda: vft.read("a.csv", columns=3)),
     "columns": ("no column", lambda: vft.read(CIRCLE, columns="q=foo*")),
     "columns of an object": ("read already", lambda: vft.contacts(RECORDING, columns="q=a*")),

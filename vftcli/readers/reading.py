@@ -152,13 +152,11 @@ def read(
         LogError: If the file cannot be read as what it is, or has no such episode or arm.
         ClockError: If its clock stops, runs backwards or holds no samples.
     """
-    choice = ReadChoice(
+    choice = replace(
+        ReadChoice.parsed(columns=columns, arm=arm, interval=interval),
         format=format,
-        columns=columns,
         signals=None if signals is None else frozenset(signals),
         episode=episode,
-        arm=arm,
-        interval=ReadChoice.option("interval").read(interval),
     )
     return choice.within(read_chosen(path, choice, label))
 
