@@ -96,7 +96,7 @@ FORMATS = {
 P = ParamSpec("P")
 R = TypeVar("R")
 #: What a call declares for an argument → what it is, in words.
-KINDS = {str | None: "a text", str | Path: "a file's name", str | Path | None: "a file's name"}
+EXPECTED = {str | None: "a text", str | Path: "a file's name", str | Path | None: "a file's name"}
 
 
 def checked_call(function: Callable[P, R]) -> Callable[P, R]:
@@ -114,8 +114,8 @@ def checked_call(function: Callable[P, R]) -> Callable[P, R]:
             raise ParameterError(f"{name}: {error}") from None
         for word, value in values.items():
             kind: Any = shown.parameters[word].annotation
-            if kind in KINDS and not isinstance(value, kind):
-                raise ParameterError(f"{name}: {word} is {value!r}; expected {KINDS[kind]}")
+            if kind in EXPECTED and not isinstance(value, kind):
+                raise ParameterError(f"{name}: {word} is {value!r}; expected {EXPECTED[kind]}")
         if not isinstance(values.get("settings") or {}, Mapping):
             raise ParameterError(f"{name}: settings are a dict, as {{'duration': 8}}")
         return function(*places, **given)
