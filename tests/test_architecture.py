@@ -244,11 +244,11 @@ def test_a_file_fits_a_few_screens() -> None:
 
 
 MOST = {
-    "lines of Python": 50_643,
+    "lines of Python": 50_641,
     "files": 210,
     "functions": 2700,
     "functions over 60 lines": 8,
-    "names, operators, numbers": 363_743,
+    "names, operators, numbers": 363_739,
     "characters a line that is not blank": 50.10,
     "noqa": 70,
     "lines of TOML, JavaScript, CSS": 7258,

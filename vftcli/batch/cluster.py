@@ -126,7 +126,7 @@ def failure_of(error: BaseException) -> Failure:
 
 @contextmanager
 def without_interrupt() -> Iterator[None]:
-    """Hold back Ctrl-C for a block, and for good in the threads and workers that it starts.
+    """Hold back Ctrl-C for a block, and for good in what it starts.
 
     A terminal sends it to every process, but the main one ends its workers.
     """

@@ -137,7 +137,7 @@ class Contact(Shown):
         return {key: parts.get(key, getattr(self, name, None)) for name, key in KEYS.items()}
 
     def row(self) -> dict[str, Any]:
-        """The record in one row: ``force_N`` becomes ``force_N_x`` …, joints are numbered."""
+        """The record in one row: ``force_N_x`` for ``force_N``, joints by number."""
         row: dict[str, Any] = {}
         for key, value in self.record().items():
             if isinstance(value, np.ndarray):

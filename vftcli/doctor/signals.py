@@ -275,7 +275,7 @@ def zero_signals(recording: Recording) -> Iterator[Remark]:
             zero &= ~value.any(axis=0)
     for name, value in efforts_of(recording):
         zero = zeros[name]
-        # A sensor's columns are rougher than motion: steps of white noise differ by √3 times.
+        # Sensors are rougher than motion: steps of white noise differ by √3 times.
         steps = np.diff(value[:, ~zero], axis=0)
         rough = np.sum(np.diff(steps, axis=0) ** 2, axis=0) > 0.5 * np.sum(steps**2, axis=0)
         measured = zero.all() or rough.mean() > 0.5

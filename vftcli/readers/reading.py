@@ -95,7 +95,7 @@ FORMATS = {
 
 P = ParamSpec("P")
 R = TypeVar("R")
-#: What a call declares for an argument → what it is, in words.
+#: An argument's declared kind → its words.
 EXPECTED = {str | None: "a text", str | Path: "a file's name", str | Path | None: "a file's name"}
 
 

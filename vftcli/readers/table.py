@@ -225,7 +225,7 @@ def require_positions(table: Table, picks: Picks) -> None:
         )
 
 
-#: Bytes of a signal in memory; a longer one is in a nameless temporary file.
+#: Bytes of a signal in memory; a longer one is in a temporary file.
 HELD = 1 << 23
 
 
