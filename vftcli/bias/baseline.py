@@ -80,17 +80,14 @@ class Baseline:
         """Deviation of the model's error, None without a correction. (T, n) [N·m]"""
         return None if self.correction is None else self.correction.sd
 
-    @property
-    def samples(self) -> list[RunSamples]:
-        """The free samples as the observers have them, less a load, which is no noise."""
-        return [
-            RunSamples(without_load(self.of(run), self.load), inside)
-            for run, inside in self.pieces
-        ]
-
     def measured(self, part: FreePart) -> Spectra:
         """The spectra of the log outside of the free part, and of the free samples."""
-        return spectra_of(RunSamples(self.of(self.motion.log), ~part.own), self.samples)
+        # As the observers have them, less a load, which is no noise.
+        free = [
+            RunSamples(without_load(self.of(run), self.load), inside)
+            for run, inside in part.pieces
+        ]
+        return spectra_of(RunSamples(self.of(self.motion.log), ~part.own), free)
 
     @property
     def pieces(self) -> tuple[RunSamples, ...]:

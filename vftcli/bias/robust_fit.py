@@ -19,6 +19,7 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
 from vftcli.bias.model_error import column_numbers
 from vftcli.robots.chain import Chain, link_jacobian, link_poses
@@ -257,9 +258,11 @@ def first_fit(rows: Rows, step: float, counted: float, least: Array) -> tuple[Ar
     rows, residual = replace(rows, loads=held), rows.d
     quiet = np.quantile(abs(residual), QUIET_SHARE, axis=0)
     scale = np.maximum(SD_PER_MEDIAN * quiet / QUIET_QUANTILE, least)
-    threshold = np.inf
+    threshold, reach = np.inf, round(REACH / step)
     for _ in range(PASSES):
-        worst = largest_around(np.max(abs(residual) / scale, axis=1), round(REACH / step))
+        # A sample shares the worst suspicion of its neighbours.
+        padded = np.pad(np.max(abs(residual) / scale, axis=1), reach, mode="edge")
+        worst = sliding_window_view(padded, 2 * reach + 1).max(axis=1)
         first = np.isinf(threshold)
         threshold = np.quantile(worst, FIRST) if first else threshold / NARROWED
         threshold = max(threshold, NARROWEST)
@@ -279,13 +282,6 @@ def free_samples(worst: Array, step: float) -> Mask:
     runs = [run for run in runs_of(worst > CONTACT) if (run[1] - run[0]) * step >= LASTS - 1e-9]
     free = ~covered(runs, len(worst), margin=round(GROWN / step))
     return free if np.count_nonzero(free) >= FEWEST else np.ones_like(free)
-
-
-def largest_around(values: Array, reach: int) -> Array:
-    """Largest of each value and its neighbours within `reach` samples. (S,)"""
-    padded = np.pad(values, reach, mode="edge")
-    windows = np.lib.stride_tricks.sliding_window_view(padded, 2 * reach + 1)
-    return np.asarray(windows.max(axis=1))
 
 
 MARGIN = 0.5  #: Cut at both ends of a fold: neighbours know each other. [s]

@@ -81,7 +81,7 @@ def find_period(recording: Recording, stated: float | None = None) -> Period:
     x = resample_columns(np.arange(t[0], t[-1], step), t, q)
     spread = np.sqrt(np.mean((x - x.mean(axis=0)) ** 2) * x.shape[1])
     closest = (float("nan"), float("inf"))
-    for lag in valleys(distances(x), step, stated):
+    for lag in valleys(x, step, stated):
         seconds, deviation = lag * step, returned(t, q, lag * step, -(-len(t) // ENOUGH))
         if deviation <= SHORTLIST * spread:
             seconds = refined_period(t, q, seconds)
@@ -122,16 +122,13 @@ def moving_part(recording: Recording) -> tuple[Array, Array]:
     return t[span], q[span]
 
 
-def distances(x: Array) -> Array:
-    """Mean squared distance of x to x so many samples later, at each lag. (N,)"""
-    x, lags, samples = x - x.mean(axis=0), np.arange(len(x)), len(x)
+def valleys(x: Array, step: float, stated: float | None) -> list[float]:
+    """Lags at which x comes nearest to itself with overlap, shortest first. [samples]"""
+    x, lags = x - x.mean(axis=0), np.arange(len(x))
     cross, behind, ahead = overlapping(x, x, lags)
-    return np.maximum(behind + ahead - 2.0 * cross, 0.0) / (samples - lags)
-
-
-def valleys(distance: Array, step: float, stated: float | None) -> list[float]:
-    """Lags at the distance's minima with overlap, shortest first. [samples]"""
-    low, high = 4, int((1.0 - LEAST_REPEATED) * len(distance))
+    # Mean squared distance of x to x so many samples later.
+    distance = np.maximum(behind + ahead - 2.0 * cross, 0.0) / (len(x) - lags)
+    low, high = 4, int((1.0 - LEAST_REPEATED) * len(x))
     if stated is not None:
         low = max(2, int(np.floor((1.0 - AROUND) * stated / step)))
         high = min(high, int(np.ceil((1.0 + AROUND) * stated / step)) + 1)

@@ -89,19 +89,6 @@ def by_phase(motion: Run, pairing: Pairing) -> Pairing:
     return Pairing(free, moved)
 
 
-def mean_of(pairings: Sequence[Pairing], signals: Sequence[Array]) -> Array:
-    """Mean of a signal over free runs at paired instants, known ones. (T, n)"""
-    if len(pairings) == 1:
-        return pairings[0].there(signals[0])
-    count, total = np.zeros(1), np.zeros(1)
-    for p, x in zip(pairings, signals, strict=True):
-        there = p.there(x)
-        known = np.isfinite(there)
-        count = count + known
-        total = total + np.where(known, there, 0.0)
-    return np.where(count > 0, total / np.maximum(count, 1), np.nan)
-
-
 @dataclass(frozen=True, kw_only=True, eq=False)
 class PairedRuns:
     """A log and its free runs, each sample of the log with its partners."""
@@ -117,8 +104,14 @@ class PairedRuns:
         return self._found[what, cutoff]
 
     def of_free(self, name: str) -> Array:
-        """A series of `Run` as the free runs have it at the paired instants. (T, n)"""
-        return mean_of(self.pairings, [getattr(p.free, name) for p in self.pairings])
+        """Mean of a series of `Run` over the free runs at paired instants. (T, n)"""
+        count, total = np.zeros(1), np.zeros(1)
+        for p in self.pairings:
+            there = p.there(getattr(p.free, name))
+            known = np.isfinite(there)
+            count = count + known
+            total = total + np.where(known, there, 0.0)
+        return np.where(count > 0, total / np.maximum(count, 1), np.nan)
 
     @cached_property
     def torque(self) -> Array:

@@ -273,9 +273,12 @@ def without_load(run: Run, load: FreeLoad | None) -> Run:
 
     By its weight alone every start and stop would look like a push.
     """
-    if load is None:
-        return run
-    body = Payload(mass=load.mass, com=load.moment / load.mass, inertia=np.zeros((3, 3)))
+    return run if load is None else with_point_mass(run, load.weights)
+
+
+def with_point_mass(run: Run, weights: Array) -> Run:
+    """A run whose model carries a mass and its moment, flange axes. (4,) [kg, kg·m]"""
+    body = Payload(mass=float(weights[0]), com=weights[1:] / weights[0])
     chain, terms = run.robot.loaded_chain, run.terms
     arms = (momentum_terms(each, run.q, run.dq) for each in (chain.with_payload(body), chain))
     p, coriolis, gravity = map(np.subtract, *arms)

@@ -2,12 +2,11 @@
 
 from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
-from vftcli.free_motion.free_motion import LEAST, PARTLY, SURE, columns
+from vftcli.free_motion.free_motion import LEAST, PARTLY, SURE, columns, with_point_mass
 from vftcli.identification.shapes import round_digits
 from vftcli.identification.training import (
     STATIC,
@@ -18,7 +17,7 @@ from vftcli.identification.training import (
 from vftcli.readers.table import listed
 from vftcli.robots.chain import Payload
 from vftcli.robots.friction import SMOOTHING
-from vftcli.robots.kernels import momentum_terms, usual_errors
+from vftcli.robots.kernels import usual_errors
 from vftcli.robots.robot import Robot
 from vftcli.robots.run import Run, RunSamples
 from vftcli.robots.terms import drive_torque, gain_sd, gravity_torque
@@ -26,7 +25,6 @@ from vftcli.signals.arrays import (
     Z_95,
     Array,
     Indices,
-    handed_over,
     intervals,
     resample_columns,
     root_mean_square,
@@ -337,7 +335,7 @@ def weigh_motion(runs: Sequence[Run], carried: Array) -> tuple[Array, Array, Arr
         each joint (n,) [N·m], and the torque's rest beside the arm's weight and friction, by power.
     """
     robot, signals = runs[0].robot, []
-    for run in [carrying(run, carried) for run in runs] if carried.any() else runs:
+    for run in [with_point_mass(run, carried) for run in runs] if carried.any() else runs:
         piece = RunSamples(run, np.ones(run.recording.samples, bool))
         if (own := columns(piece)) is not None:
             at = own[0]
@@ -355,16 +353,6 @@ def weigh_motion(runs: Sequence[Run], carried: Array) -> tuple[Array, Array, Arr
     covariance = fit.motion_covariance(weight, gain)[:STATIC, :STATIC]
     power = np.sum(usable * fit.left**2) / max(np.sum(usable * bare.left**2), 1e-12)
     return x, covariance, root_mean_squares(fit.left), np.sqrt(power)
-
-
-def carrying(run: Run, x: Array) -> Run:
-    """A run with a point mass x (4,) [kg, kg·m] in flange axes in its model."""
-    load = Payload(mass=float(x[0]), com=x[1:] / x[0])
-    q, dq, bare, terms = run.recording.q, run.recording.require("dq"), run.robot.chain, run.terms
-    own, loaded = momentum_terms(bare, q, dq), momentum_terms(bare.with_payload(load), q, dq)
-    more = loaded.coriolis_transpose_dq - own.coriolis_transpose_dq
-    mu = handed_over(terms.mu + more - loaded.gravity + own.gravity)
-    return run.holding(terms=replace(terms, p=handed_over(terms.p + loaded.p - own.p), mu=mu))
 
 
 def find_load(logs: Sequence[Recording], robot: Robot, free: Recording | None) -> LoadFit:
