@@ -68,7 +68,7 @@ def test_files_are_found_in_paths_references_and_robots(tmp_path: Path) -> None:
     assert there.robot.name == "/there/arm.toml"
     assert there.free.logs == (Path("/there/free.csv"),)
     assert there.reference.name == "file:/there/truth.parquet"
-    assert there.observers.gains_file == Path("/there/gains.toml")
+    assert there.observers.gains == Path("/there/gains.toml")
     assert there.library is not None
 
 

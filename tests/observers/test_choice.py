@@ -11,7 +11,6 @@ from vftcli.observers import (
     LEAD,
     LONGEST,
     ObserverChoice,
-    estimate_from_rest,
     lead_samples,
     settling_samples,
 )
@@ -162,7 +161,7 @@ def test_a_load_that_was_there_all_the_time_shows_at_once(name, step):
     """At rest under 3 N·m, τ_ext = −μ in every sample, on even and uneven clocks."""
     still = terms(step, -3.0)
     still = DynamicsTerms(t=still.t, p=np.zeros((120, 7)), mu=still.mu)
-    found = estimate_from_rest(observer(name, step), still)
+    found = ObserverChoice(from_rest=True).run(observer(name, step), still)
     # 60 time constants leave e⁻⁶⁰; rounding of sums of hundreds of samples
     np.testing.assert_allclose(found.tau, 3.0, atol=1e-12)
     np.testing.assert_array_equal(found.t, still.t)

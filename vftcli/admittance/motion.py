@@ -161,11 +161,6 @@ def drags_of(phases: Phases, period: float) -> tuple[Drag, ...]:
     return tuple(found)
 
 
-def releases_of(x: Array, rows: int) -> tuple[Drag, ...]:
-    """Axes released at deviation `x` (6,), each as a drag that ended at row 0."""
-    return tuple(Drag(axis, 1, 0, 0, rows) for axis in np.flatnonzero(x).tolist())
-
-
 def rows_of(
     controllers: Sequence[Controller], motion: AxisMotion, drags: Sequence[Drag], wrench: Array
 ) -> list[dict[str, Any]]:
@@ -276,10 +271,8 @@ class JointPath(NamedTuple):
     #: Positions; out of reach it waits at the last one. (T, N, n) [rad]
     q: Array
     reached: Mask  #: Whether the flange pose is reached inside the joint limits. (T, N)
-    speed: (
-        #: Largest joint speed as a share of its limit, NaN where no limit is known. (N,)
-        Array
-    )
+    #: Largest joint speed as a share of its limit, NaN where no limit is known. (N,)
+    speed: Array
 
 
 def follow(robot: Robot, start: Array, x: Array, period: float) -> JointPath:

@@ -29,7 +29,6 @@ from vftcli.admittance.motion import (
     follow,
     phases,
     release,
-    releases_of,
     rows_of,
     run,
 )
@@ -170,14 +169,15 @@ def replay_release(
         )
     complaints = check_stable(controllers, anyway=anyway, release=x)
     motion = release(controllers, x, duration or settling(controllers, x))
-    force = np.zeros((len(motion.t) - 1, 6))
+    rows = len(motion.t)
     return Replay(
         robot=robot,
         controllers=tuple(controllers),
         start=check_start(robot, start),
-        wrench=force,
+        wrench=np.zeros((rows - 1, 6)),
         motion=motion,
-        drags=releases_of(x, len(motion.t)),
+        # Each released axis as a drag that ended at row 0.
+        drags=tuple(Drag(axis, 1, 0, 0, rows) for axis in np.flatnonzero(x).tolist()),
         force_remarks=complaints,
     )
 

@@ -85,9 +85,7 @@ class WholeLogBias:
     #: `fitted_times`. (S, n) [N·m]
     load: Array
     remarks: tuple[Remark, ...]  #: What was applied, and what was not and why.
-    fitted: bool = (
-        True  #: Whether there was a fit; else `free` and `load` say nothing of the log.
-    )
+    fitted: bool = True  #: Whether there was a fit; else `free` and `load` say nothing.
     #: The model's error on the joints left alone too, None where nothing was fitted.
     error: ModelError | None = field(default=None, repr=False)
 

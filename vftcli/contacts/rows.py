@@ -158,7 +158,25 @@ class ContactMeasurement:
     @cached_property
     def locations(self) -> list[ContactLocation]:
         """Place of every contact, from the disturbance less the model error."""
-        return [self.location(i) for i in range(len(self.found.runs))]
+        blocks, chain, found = self.log.blocks, self.run.robot.loaded_chain, []
+        each = zip(self.found.runs, self.wrenches, self.found.evidence, strict=True)
+        for run, wrench, nats in each:
+            size = wrench.within(run).size
+            peak = run[0] + size.argmax()
+            core = np.arange(*run)[size >= CORE * size.max()]
+            core = core[abs(blocks.t[core] - blocks.t[peak]) <= CORE_TIME]
+            known = core[blocks.known[core]]
+            core = known if known.size else core
+            mean, variance = (series[core] for series in self.quiet)
+            torque = (blocks.d[core] - mean).mean(axis=0)
+            white = self.log.process.white[core].mean(axis=0) / len(core)
+            fits = point_fits(
+                chain, blocks.q[peak], torque, np.sqrt(variance.mean(axis=0) + white)
+            )
+            likely = np.flatnonzero(nats > nats.max() - SURE_NATS)
+            links = tuple(self.found.places[k].link for k in likely)
+            found.append(ContactLocation(fits, chain.joints, links))
+        return found
 
     def rows(self, locations: Sequence[ContactLocation] | None = None) -> list[Contact]:
         """The contacts, numbered, in the order of time; better places may be given."""
@@ -178,25 +196,6 @@ class ContactMeasurement:
             wrenches[i] = wrench
         each = enumerate(zip(wrenches, locations, strict=True))
         return [self.row(i, *pair, moved.get(i, J)) for i, pair in each]
-
-    def location(self, number: int) -> ContactLocation:
-        """Place of a contact."""
-        run, blocks = self.found.runs[number], self.log.blocks
-        size = self.wrenches[number].within(run).size
-        peak = run[0] + size.argmax()
-        core = np.arange(*run)[size >= CORE * size.max()]
-        core = core[abs(blocks.t[core] - blocks.t[peak]) <= CORE_TIME]
-        known = core[blocks.known[core]]
-        core = known if known.size else core
-        mean, variance = (series[core] for series in self.quiet)
-        torque = (blocks.d[core] - mean).mean(axis=0)
-        white = self.log.process.white[core].mean(axis=0) / len(core)
-        chain, sd = self.run.robot.loaded_chain, np.sqrt(variance.mean(axis=0) + white)
-        fits, nats = point_fits(chain, blocks.q[peak], torque, sd), self.found.evidence[number]
-        likely = [
-            self.found.places[k].link for k in np.flatnonzero(nats > nats.max() - SURE_NATS)
-        ]
-        return ContactLocation(fits, chain.joints, tuple(likely))
 
     def row(
         self, number: int, course: WindowWrench, location: ContactLocation, jacobian: JacobianIn

@@ -215,9 +215,8 @@ class FreeMotion(Shown):
         return replace(self, choice=replace(self.choice, spans=spans))
 
 
-LEAST = (
-    0.4  #: A load from which it is one: drive constants that are 3 % off look like .3 kg. [kg]
-)
+#: A load from which it is one: drive constants that are 3 % off look like .3 kg. [kg]
+LEAST = 0.4
 SURE = 4.0  #: SDs that it has to be.
 PARTLY = 0.8  #: Share of the free part's disturbance that it may leave at most.
 CUTOFF = 6.0  #: Where the disturbance is low-passed before it is weighed. [Hz]

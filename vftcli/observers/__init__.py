@@ -138,11 +138,6 @@ class ObserverChoice(Choice):
         return name.partition(".")[0] in SECTIONS
 
     @property
-    def gains_file(self) -> Path | None:
-        """A file of gains that override the robot's own, or None."""
-        return self.gains if isinstance(self.gains, Path) else None
-
-    @property
     def match(self) -> "Goal | None":
         """The goal that every observer shares on every joint, or None."""
         return None if isinstance(self.gains, str | Path) else self.gains
@@ -187,8 +182,8 @@ class ObserverChoice(Choice):
         table.check_gains(gains, str(robot.path or robot.name))
         if self.gains_of_log:
             gains = table.overlay_gains(gains, shown.gains or {})
-        elif self.gains_file is not None:
-            gains = table.overlay_gains(gains, table.load_gains(self.gains_file))
+        elif isinstance(self.gains, Path):
+            gains = table.overlay_gains(gains, table.load_gains(self.gains))
         setup = table.Setup(gains, self.settings, robot.joints, step, self.as_printed, shown)
         if self.gains_of_log:
             # the convention of a log's gains, and so of their fallback
@@ -209,32 +204,29 @@ class ObserverChoice(Choice):
         return observers, (*remarks, *on_match)
 
     def run(self, observer: "Observer", terms: "DynamicsTerms") -> "ExternalTorque":
-        """Estimate of one of the observers over a log, from rest or zero."""
-        return estimate_from_rest(observer, terms) if self.from_rest else observer.estimate(terms)
+        """Estimate of one of the observers over a log, from zero or from rest.
+
+        From rest it is as if the log's first sample had lasted for long. Then τ̂⁰ = −μ⁰ where
+        unbiased, by ṗ = μ + τ_ext; from zero a log that begins in contact rises over some delays.
+        """
+        if not self.from_rest:
+            return observer.estimate(terms)
+        import numpy as np
+
+        from vftcli.signals.external_torque import DynamicsTerms
+
+        step = terms.clock.step
+        count = lead_samples(observer, step, terms.joints)
+        before = terms.t[0] - step * np.arange(count, 0, -1)
+        p, mu = (np.vstack([x[:1].repeat(count, axis=0), x]) for x in (terms.p, terms.mu))
+        found = observer.estimate(DynamicsTerms(t=np.concatenate([before, terms.t]), p=p, mu=mu))
+        sd = None if found.sd is None else found.sd[count:]
+        return replace(found, t=terms.t, tau=found.tau[count:], sd=sd)
 
 
 LEAD = 60.0  #: Assumed rest of the arm before a log, in 1/ω_n of the slowest joint.
 LONGEST = 1 << 17  #: Samples of that time at most.
 SETTLED = 0.01  #: Share of its start left in a settled estimate.
-
-
-def estimate_from_rest(observer: "Observer", terms: "DynamicsTerms") -> "ExternalTorque":
-    """An estimate as if the log's first sample had lasted for long.
-
-    Then τ̂⁰ = −μ⁰ where unbiased, by ṗ = μ + τ_ext; from zero a log that begins in contact
-    rises over some delays.
-    """
-    import numpy as np
-
-    from vftcli.signals.external_torque import DynamicsTerms
-
-    step = terms.clock.step
-    count = lead_samples(observer, step, terms.joints)
-    before = terms.t[0] - step * np.arange(count, 0, -1)
-    p, mu = (np.vstack([x[:1].repeat(count, axis=0), x]) for x in (terms.p, terms.mu))
-    found = observer.estimate(DynamicsTerms(t=np.concatenate([before, terms.t]), p=p, mu=mu))
-    sd = None if found.sd is None else found.sd[count:]
-    return replace(found, t=terms.t, tau=found.tau[count:], sd=sd)
 
 
 def settling_samples(observer: "Observer", step: float, joints: int) -> int:

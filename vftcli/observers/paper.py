@@ -294,12 +294,8 @@ class KalmanObserver(BlockObserver):
         self, terms: DynamicsTerms, state: KalmanState | None = None
     ) -> tuple[ExternalTorque, KalmanState]:
         """A block's estimate after the last block's state; None at the log's start."""
-        n, step, begins, d = (
-            terms.joints,
-            terms.clock.step,
-            state is None,
-            self.unexplained(terms),
-        )
+        n, step, begins = terms.joints, terms.clock.step, state is None
+        d = self.unexplained(terms)
         zero, densities, settled = np.zeros((2, n)), self.densities(n), self.steady(step, n)
         if terms.clock.uniform:
             F, g = error_filter(settled, self.model(step, n))
