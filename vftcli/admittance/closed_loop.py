@@ -56,7 +56,7 @@ class ClosedLoop(NamedTuple):
     moved: Array  #: Deviation of the flange itself from where it started. (T, 6) [m, rad]
     reached: Mask  #: Whether the inverse kinematics found the commanded pose. (T,)
     zero: Array  #: Zero of the wrench that was removed. (6,) [N, N·m]
-    simulation: Simulation | None  #: The log and truth of the run, None if it ran away.
+    simulation: Simulation | None  #: Log and truth, None if the arm ran away.
 
     @property
     def stable(self) -> bool:
@@ -65,7 +65,7 @@ class ClosedLoop(NamedTuple):
 
     @property
     def wrench(self) -> Wrench:
-        """Wrench the controller acted on, for a replay as in the paper's Figs 7 and 10."""
+        """Wrench of the controller, for a replay as in Figs 7 and 10."""
         return Wrench(name="controller", t=self.t, values=self.estimate, frame="base")
 
 
@@ -92,7 +92,7 @@ class OnlineKalman:
         self.mu, self.tau = np.zeros(n), np.zeros(n)
 
     def sample(self, q: Array, dq: Array, torque: Array) -> Array:
-        """The external torque after one more sample [rad, rad/s, N·m]. (n,) [N·m]"""
+        """The external torque after a sample [rad, rad/s, N·m]. (n,) [N·m]"""
         pin, model, data = self.pin, self.model, self.data
         C = pin.computeCoriolisMatrix(model, data, q, dq)
         p = pin.crba(model, data, q) @ dq
@@ -123,7 +123,7 @@ class OnlineKalman:
 
 
 class Loop:
-    """The controller's side of the loop: sensors, observer, phases, law, kinematics."""
+    """The controller's side: sensors, observer, phases, law, kinematics."""
 
     def __init__(
         self, arm: Arm, controller: Controller, observer: KalmanObserver, *, averaged: bool
@@ -303,14 +303,14 @@ class Replayed(NamedTuple):
 
     replay: Replay  #: The comparison.
     recording: Recording | None = None  #: The log, None without one.
-    run: ClosedLoop | None = None  #: A scenario with the controller in the loop, or None.
+    run: ClosedLoop | None = None  #: A closed-loop run, or None.
     examinations: tuple[Examination, ...] = ()  #: Findings on the log.
 
 
 class Latency(NamedTuple):
     """Times of one application of a force [s]; None where it did not happen."""
 
-    axis: int  #: Index of the axis on which the true force passes its threshold first.
+    axis: int  #: Index of the axis that passes its threshold first.
     force: float  #: When it passes.
     detection: float | None  #: Time from then until the estimate passes it.
     #: Time from `force` until the flange has moved by `STARTED` (or `TURNED`).
@@ -321,7 +321,7 @@ class Latency(NamedTuple):
     reaction: float | None
     #: From the estimate's fall below the threshold to the turn. [s]
     turn: float | None
-    #: Whether the flange was at rest when the force came; else `motion` says nothing.
+    #: Whether the flange was at rest before; else `motion` says nothing.
     rested: bool
 
 

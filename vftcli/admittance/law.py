@@ -69,7 +69,7 @@ class Admittance:
     speed_limit: Array | float = np.inf  #: Ẋ_tsd; infinite for none.
     speed_scale: Array | float = 1.0  #: v₀ in e^{|v|/v₀}: 1 m/s and 1 rad/s.
     period: float  #: Control period. [s]
-    threshold_mode: str = "hard"  #: Rule for the entering force, see `vftcli.admittance.motion`.
+    threshold_mode: str = "hard"  #: Rule for the entering force, see `motion.phases`.
     source: str = ""  #: Where the numbers come from, in words.
 
     def __post_init__(self) -> None:
@@ -221,7 +221,7 @@ class Controller:
             return factor * scale / self.rate
 
     def complaints(self, size: Array | float = np.inf) -> Iterator[Remark]:
-        """Instabilities of releases from rest of a size (6,) [m, rad], or of all motion."""
+        """Instabilities of releases of a size (6,) [m, rad], or of all motion."""
         where, limited = Where(self.name), np.isfinite(self.parameters.speed_limit)
         # Without a speed limit it is infinite; the escape says why.
         at_limit = np.where(limited, self.recovery, 0.0)
@@ -253,7 +253,7 @@ def variable(parameters: Admittance, alpha: float | None = None) -> Controller:
 def controllers(
     parameters: Admittance, kind: str | None = None, alphas: Sequence[float] = ()
 ) -> tuple[Controller, ...]:
-    """Controllers of a comparison, the traditional one first; of one kind if given."""
+    """Controllers, the traditional one first; of one kind if given."""
     every = [variable(parameters, alpha) for alpha in dict.fromkeys(alphas) or (None,)]
     return tuple(c for c in (traditional(parameters), *every) if kind in {None, c.kind})
 

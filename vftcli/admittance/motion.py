@@ -15,10 +15,10 @@ from vftcli.signals.arrays import Array, Mask, intervals
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.pose import exp_matrix, exp_quaternion, log_quaternion, quaternion_product
 
-PAUSE = 1.0  #: Drags of one axis that follow each other within this time are one. [s]
+PAUSE = 1.0  #: Drags of one axis closer than this are one. [s]
 #: Return time → share of the deviation at release inside which the axis has to stay.
 SHARES = {"return_10_s": 0.10, "return_2_s": 0.02}
-#: A release nearer to zero than this share of the largest deviation has no return. [1]
+#: A release below this share of the largest deviation has no return. [1]
 RELEASED = 0.2
 
 
@@ -59,7 +59,7 @@ class AxisMotion(NamedTuple):
     the rotation is the vector log(R R_dᵀ).
     """
 
-    t: Array  #: Time; T control periods after the start come T + 1 rows. (T+1,) [s]
+    t: Array  #: Time of T + 1 rows, T control periods. (T+1,) [s]
     x: Array  #: Deviations X̃ from the target pose. (T+1, N, 6) [m, rad]
     v: Array  #: Velocities. (T+1, N, 6) [m/s, rad/s]
 
@@ -151,7 +151,7 @@ class Drag(NamedTuple):
 
 
 def drags_of(phases: Phases, period: float) -> tuple[Drag, ...]:
-    """The drags of every axis along a record of T forces (rows 0 … T of the motion)."""
+    """The drags of every axis along T forces (rows 0 … T of the motion)."""
     found, t = list[Drag](), np.arange(len(phases.dragged), dtype=float) * period
     for axis, dragged in enumerate(phases.dragged.T):
         # From the last dragged sample of one to the first of the next.
@@ -271,7 +271,7 @@ class JointPath(NamedTuple):
     #: Positions; out of reach it waits at the last one. (T, N, n) [rad]
     q: Array
     reached: Mask  #: Whether the flange pose is reached inside the joint limits. (T, N)
-    #: Largest joint speed as a share of its limit, NaN where no limit is known. (N,)
+    #: Largest joint speed as a share of its limit, NaN without one. (N,)
     speed: Array
 
 
@@ -303,7 +303,7 @@ def follow(robot: Robot, start: Array, x: Array, period: float) -> JointPath:
 def try_pose(
     solver: FlangeSolver, rotation: Array, point: Array, guess: Array, last: Array
 ) -> tuple[Array, bool]:
-    """Joints at a pose, from a guess or, if that fails or leaps, from `last`. (n,)"""
+    """Joints at a pose, from a guess or, if it leaps, from `last`. (n,)"""
     if not np.isfinite(point).all():
         return last, False
     found, good = solver.reach(rotation, point, guess)

@@ -63,7 +63,7 @@ class Replay:
     start: Array  #: Joint positions of the target pose X_d. (n,) [rad]
     #: Wrench on the robot each period, base axes. (T, 6) [N, N·m]
     wrench: Array
-    motion: AxisMotion  #: Deviations and velocities, row 0 before the first force.
+    motion: AxisMotion  #: Its motion, row 0 before the first force.
     drags: tuple[Drag, ...]  #: The drags of every axis.
     #: Logged flange less X_d, None for a release. (T, 6) [m, rad]
     logged: Array | None = None
@@ -235,7 +235,7 @@ def drag_remarks(found: Replay) -> Iterator[Remark]:
 
 
 def trouble(found: Replay) -> Iterator[Remark]:
-    """Remarks on errors and limits, controller by controller, and impossible travel.
+    """Remarks on errors, limits and impossible travel.
 
     Where every pose is reached the travel is plausible, however long.
     """
@@ -286,7 +286,7 @@ def stored_force(
     sensor = VirtualSensor(
         solver=choice.by_pose, frame=choice.frame, mounting=choice.mounting(robot)
     )
-    # Nobody kept the covariance of this torque: its band says nothing of the replay.
+    # Nobody kept this torque's covariance: its band says nothing.
     seen = replace(sensor.wrench(estimate, recording.q, robot.chain), remarks=())
     return DrivingForce(
         without_zero(seen, choice.zero), fact("force-of-observer", observer=observer)

@@ -70,20 +70,20 @@ class Contact(Shown):
     start: float  #: When it begins. [s]
     stop: float  #: When it ends. [s]
     peak: float  #: When |F| is largest. [s]
-    #: Whether it is a load, a wrong payload or a wrong model; its numbers are then means.
+    #: Whether it is a load, or a wrong payload or model; its numbers are then means.
     is_load: bool = False
     peak_force: float | None  #: |F| at the peak. [N]
     #: Half width of its 95 % band, what the place may change in it. [N]
     peak_band: float | None
-    place_band: float | None  #: Half width of its 95 % band at the place that fits best. [N]
+    place_band: float | None  #: Half width of its 95 % band at the best place. [N]
     wrench: Array | None  #: Force and moment at the peak. (6,) [N, N·m]
     wrench_sd: Array | None  #: Standard deviation. (6,) [N, N·m]
     mean_force: Array | None  #: Mean force. (3,) [N]
     impulse: Array | None  #: ∫F dt. (3,) [N·s]
-    #: Smallest and largest |F| over every place that fits, bands included. [N]
+    #: Smallest and largest |F| of the places that fit, with bands. [N]
     anywhere: tuple[float, float] | None
     where: "ArmPart"  #: Part of the arm.
-    #: Evidence of that part's best place less that of every other part. [nats]
+    #: Evidence of its best place less that of every other part. [nats]
     lead: float | None
     places: tuple[int, ...]  #: Links that fit; 0 is the flange.
     evidence: float | None  #: Evidence of the best place less that of nothing. [nats]
@@ -94,7 +94,7 @@ class Contact(Shown):
     vendor_force: float | None = None
     #: |F| of the log's own wrench at the peak, None without one. [N]
     sensor_force: float | None = None
-    course: ForceCourse | None = None  #: |F| from start to end, None where no force is known.
+    course: ForceCourse | None = None  #: |F| from start to end, None without a force.
     #: Whether neither free motion nor a reference checks its size.
     inferred: bool = False
     remarks: tuple[Remark, ...] = ()  #: Limits of this row.
@@ -116,7 +116,7 @@ class Contact(Shown):
 
     @property
     def size(self) -> str:
-        """|F| at the peak with its band or range; joint torques without a force."""
+        """|F| at the peak with its band or range; without a force joint torques."""
         if self.peak_force is None:
             return f"{joined(self.joint_torque)} N·m"
         if self.place_unknown and self.anywhere:
@@ -137,7 +137,7 @@ class Contact(Shown):
         return {key: parts.get(key, getattr(self, name, None)) for name, key in KEYS.items()}
 
     def row(self) -> dict[str, Any]:
-        """The record in one row: ``force_N_x`` for ``force_N``, joints by number."""
+        """The record in one row: ``force_N_x`` …, joints by number."""
         row: dict[str, Any] = {}
         for key, value in self.record().items():
             if isinstance(value, np.ndarray):
@@ -165,7 +165,7 @@ class Contact(Shown):
 
     @property
     def goes_with_place(self) -> bool:
-        """Whether another possible place changes its force by more than `WIDE` of it."""
+        """Whether another place changes its force by more than `WIDE` of it."""
         size = self.peak_force or 0.0
         return any(abs(end - size) > WIDE * size for end in self.anywhere or ())
 
@@ -251,12 +251,12 @@ class ContactList(Shown):
     free_seconds: float = 0.0  #: Length of the free motion. [s]
     #: Contacts listed in the log's own free part, None where it has none.
     false_on_free: int | None = None
-    threshold: float | None = None  #: Evidence that a contact must have, None without. [nats]
+    threshold: float | None = None  #: Least evidence of a contact, None without. [nats]
     #: The smallest force that this log can tell, None without a wrench. [N]
     smallest_force: float | None = None
     #: The largest torque if nothing can be listed, else None.
     unexplained: Unexplained | None = None
-    #: A load that the arm carries and its model lacks, None where none shows.
+    #: A load that the model lacks, None where none shows.
     load: CarriedLoad | None = None
     #: When the arm stopped so abruptly that what follows is no contact. [s]
     stops: tuple[float, ...] = ()
@@ -287,7 +287,7 @@ class ContactList(Shown):
             yield c.number, f"{c.start:.2f} – {c.stop:.2f}", c.size, force, c.where, c.trust
 
     def to_polars(self) -> "pl.DataFrame":
-        """One row a contact, the columns of ``contacts.csv``, units in their names."""
+        """One row a contact, the columns of ``contacts.csv``."""
         import polars as pl
 
         if not self.contacts:
@@ -295,7 +295,7 @@ class ContactList(Shown):
         return pl.DataFrame([c.row() for c in self.contacts], infer_schema_length=None)
 
     def plot(self) -> "Figure":
-        """A matplotlib figure of every contact's |F| with its band, not shown or saved."""
+        """A matplotlib figure of each contact's |F| and band, not shown or saved."""
         figures = import_module("vftcli.outputs.figures")
         figure: Figure = figures.on_paper(figures.force_drawing(self))
         return figure
@@ -316,7 +316,7 @@ class ContactList(Shown):
         return replace(self, load=carried, contacts=rows, candidates=others)
 
     def without_forces(self) -> "ContactList":
-        """The list of an arm with too few joints for a wrench: times, joint torques."""
+        """The list of an arm with too few joints for a wrench."""
         nothing: dict[str, Any] = dict.fromkeys(OF_FORCES)
         rows, weak = (
             tuple(replace(row, **nothing) for row in part)
@@ -326,7 +326,7 @@ class ContactList(Shown):
         return replace(self, contacts=rows, candidates=weak, smallest_force=None, remarks=remarks)
 
     def not_free(self, t: Array) -> Iterator[Remark]:
-        """A warning if a log (T,) [s] that should be free is not, with its longest free span."""
+        """A warning if a log (T,) [s] is not free, with its longest free span."""
         if not self.contacts:
             return
         worst = self.hardest or self.contacts[0]
@@ -361,6 +361,6 @@ class ContactList(Shown):
 
     @property
     def hardest(self) -> Contact | None:
-        """The contact with the largest known force; the largest of all without any."""
+        """The contact with the largest known force, else the largest of all."""
         felt = [contact for contact in self.contacts if contact.peak_force is not None]
         return max(felt, key=lambda c: (c.size_known, c.peak_force or 0.0), default=None)

@@ -71,7 +71,7 @@ PSEUDO, MOST_PSEUDO = 0.6, 48
 
 @dataclass(frozen=True, eq=False)
 class FreeStatistics:
-    """Noise and level of motion that nobody touched, as a list of contacts needs them."""
+    """Noise and level of motion that nobody touched."""
 
     noise: TorqueNoise  #: Noise and model error.
     level: Array  #: SD of the momentum observer's torque in it. (n,) [N·m]
@@ -92,7 +92,7 @@ class FreeStatistics:
 
     @cached_property
     def fine(self) -> "tuple[FreeStatistics, Blocks] | None":
-        """Its noise in finer blocks, and the log in these; None if none are finer."""
+        """Its noise, and the log, in finer blocks; None if none are finer."""
         seconds, run = max(FINE, self.log.step), self.log
         # On a clock that jitters blocks are as short as they may be.
         if not seconds < 0.7 * self.seconds <= 0.7 * BLOCK:
@@ -130,7 +130,7 @@ def free_statistics(motion: FreeMotion, bias: WholeLogBias) -> FreeStatistics | 
 
 
 def inferred_statistics(log: Run, bias: WholeLogBias) -> FreeStatistics | None:
-    """Statistics that a log implies without known free motion, None where none.
+    """Statistics of a log without known free motion, or None.
 
     The whole log's model error is subtracted where its guard allows it, then a load. None
     without dry friction where no whole joint is corrected.
@@ -161,7 +161,7 @@ def inferred_statistics(log: Run, bias: WholeLogBias) -> FreeStatistics | None:
 def noise_of(
     log: Run, pieces: Sequence[RunSamples], seconds: float, *, known: bool
 ) -> TorqueNoise | None:
-    """Noise of free pieces, else of the log, by blocks of a length [s]; or None."""
+    """Noise of free pieces, else of the log, in blocks of a length [s]."""
     dry = dry_torques(log.robot)
     learned = learn_noise(blocks_of(pieces, seconds), dry)
     if known:
@@ -175,7 +175,7 @@ def blocks_of(pieces: Sequence[RunSamples], seconds: float) -> list[Blocks]:
 
 
 def free_part(motion: FreeMotion) -> FreePart | None:
-    """The free part of a log; None without one, or if the one found is doubtful."""
+    """The free part of a log; None without one, or if it is doubtful."""
     try:
         part = motion.known
     except ReferenceTorqueError:  # nothing repeats, or too little of it was recorded
@@ -272,7 +272,7 @@ def self_test(free: FreeStatistics, prior: WrenchPrior) -> Array:
 
 
 def listed_force(free: FreeStatistics, log: BlockLog, least: float, untold: Mask) -> float:
-    """The force with which 95 % of trial pushes at the flange would be listed. [N]
+    """The force that lists 95 % of trial pushes at the flange. [N]
 
     Each lasts `PSEUDO`, somewhere in the log, in any direction. Without it the model error
     explains its torque: evidence ½F² Σν²/S, ν of 1 N. At rest F_c must give way first.

@@ -190,10 +190,7 @@ def adjoining(runs: Sequence[BlockSpan], rows: Sequence[Contact]) -> list[list[i
 
 
 def measured_rows(free: FreeStatistics, measurement: ContactMeasurement) -> list[Contact]:
-    """The rows of a measurement.
-
-    Those of short contacts come from finer blocks if these exist.
-    """
+    """The rows of a measurement; short contacts' from finer blocks if there are any."""
     found, rows = measurement.found, measurement.rows()
     brief = [k for k, seconds in enumerate(found.lasts) if seconds < SHORT]
     if not brief or free.fine is None:
@@ -216,7 +213,7 @@ def measured_rows(free: FreeStatistics, measurement: ContactMeasurement) -> list
 
 
 def rests_around(run: Run, found: Candidates, span: BlockSpan, joints: Mask) -> bool:
-    """Whether joints (n,) rest during a candidate, and for `AROUND` before and after it."""
+    """Whether joints (n,) rest during a candidate and `AROUND` it."""
     t = found.log.blocks.t
     first, last = run.t.searchsorted([t[span[0]] - AROUND, t[span[1] - 1] + AROUND])
     speed = abs(run.dq[first:last, joints])
@@ -238,7 +235,7 @@ def false_rows(free: FreeStatistics) -> int:
 
 
 def without_list(run: Run) -> ContactList:
-    """A list without rows, where nothing tells a contact from an error of the model."""
+    """A list without rows: nothing tells a contact from an error of the model."""
     unknown = np.full(run.robot.joints, np.nan)
     torque = abs(observed(run))
     torque[run.t < run.t[0] + SETTLED] = 0.0
@@ -266,7 +263,7 @@ PIECE = 5.0  #: Length of the pieces that show the mean's spread. [s]
 BRIEF = 0.3  #: Longest row that a stop explains. [s]
 #: Moving, then stopped, then at rest, about a row's start; not so a knock at rest. [s]
 BEFORE, AT_STOP, AFTER = (-0.25, -0.05), (-0.25, 0.1), (0.12, 0.35)
-RINGING = 0.05  #: Share of the speed before that may be left at rest, while the arm rings.
+RINGING = 0.05  #: Share of the speed before that ringing may leave at rest.
 
 
 def is_load(recording: Recording, contacts: Sequence[Contact]) -> bool:
@@ -289,7 +286,7 @@ def is_load(recording: Recording, contacts: Sequence[Contact]) -> bool:
 
 
 def load_row(motion: FreeMotion, contacts: Sequence[Contact]) -> Contact | None:
-    """One row for contacts that are a load: mean of the ungated wrench, and band.
+    """One row for contacts that are a load: the ungated wrench's mean.
 
     None if less than half of it acts between them. SD of the mean:
     √(s²/m + (3 % of it)²), s the spread of m means over 5 s.
@@ -332,7 +329,7 @@ def load_row(motion: FreeMotion, contacts: Sequence[Contact]) -> Contact | None:
 
 
 def follows_stop(recording: Recording, span: Sequence[float] | Array, block: float) -> bool:
-    """Whether a row [s] begins where all joints come to rest at once, and is brief."""
+    """Whether a row [s] is brief and begins where all joints stop at once."""
     start, stop = span
     if stop - start > BRIEF + block:
         return False

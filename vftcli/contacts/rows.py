@@ -76,7 +76,7 @@ class ContactLocation(NamedTuple):
 
     @property
     def on_wrist(self) -> bool:
-        """Whether a wrench at the flange explains it: wrist, or no point force."""
+        """Whether a wrench at the flange explains it."""
         return "wrist" in self.parts or not self.is_force
 
     @property
@@ -113,7 +113,7 @@ class ContactMeasurement:
 
     run: Run  #: The log with its robot's model.
     found: Candidates  #: The contacts that were kept.
-    log: BlockLog  #: The log in blocks; joints at rest may settle anew under a contact.
+    log: BlockLog  #: The log in blocks; under a contact joints may settle anew.
     prior: WrenchPrior  #: Prior of the contacts' wrench.
     widening: Array  #: Factor on each axis' SD that free motion asks. (6,)
     bent: float  #: Share of a peak's bend that may be hidden.
@@ -127,7 +127,7 @@ class ContactMeasurement:
         like: "ContactMeasurement | None" = None,
         bent: float = BENT,
     ) -> "ContactMeasurement":
-        """Contacts of `free`'s log; prior and widening from `like`, else from the log."""
+        """Contacts of `free`'s log; prior and widening from `like` or the log."""
         blocks, J = found.log.blocks, found.places[0].jacobian
         gate = covered(found.runs, len(blocks.t), 1)
         process = error_process(free.noise, blocks, gate)._replace(white=found.log.process.white)
@@ -139,7 +139,7 @@ class ContactMeasurement:
 
     @cached_property
     def quiet(self) -> tuple[Array, Array]:
-        """Mean and variance of the model error beside contacts. (K, n) [N·m], [(N·m)²]"""
+        """Mean and variance of the error beside contacts. (K, n) [N·m], [(N·m)²]"""
         d, touched = self.log.blocks.d, covered(self.found.runs, len(self.log.blocks.d), 1)
         return quiet_error(d, self.log.process.hiding(touched))
 
@@ -179,7 +179,7 @@ class ContactMeasurement:
         return found
 
     def rows(self, locations: Sequence[ContactLocation] | None = None) -> list[Contact]:
-        """The contacts, numbered, in the order of time; better places may be given."""
+        """The contacts in the order of time; better places may be given."""
         runs, J, wrenches = self.found.runs, self.found.places[0].jacobian, [*self.wrenches]
         chain, q = self.run.robot.loaded_chain, self.log.blocks.q
         locations = locations or self.locations
@@ -283,7 +283,7 @@ def force_course(t: Array, force: Array, covariance: Array) -> ForceCourse:
 
 
 def vendor_force(run: Run, J: Array, at: float) -> float | None:
-    """|F| at the flange of the log's own torque at a time, None without one. [N]"""
+    """|F| at the flange of the log's own torque at a time, or None. [N]"""
     own = run.recording.tau_ext
     if own is None or J.shape[1] < 6:
         return None
@@ -292,7 +292,7 @@ def vendor_force(run: Run, J: Array, at: float) -> float | None:
 
 
 def sensor_force(run: Run, at: float) -> float | None:
-    """|F| of the log's own wrench at a time, None without one or all zeros. [N]"""
+    """|F| of the log's own wrench at a time, None if all zeros. [N]"""
     own = run.recording.wrench
     if own is None or not own.any():
         return None

@@ -75,7 +75,7 @@ class Candidates(NamedTuple):
     places: list[ContactPlace]  #: Possible places of a contact.
     runs: list[BlockSpan]  #: Blocks of every candidate, in the order of time.
     evidence: Array  #: Of every candidate at every place. (C, places) [nats]
-    #: Of every candidate whether a joint's torque is beyond its threshold in it.
+    #: Whether a joint's torque is beyond its threshold in each.
     beyond: list[bool]
     prior: WrenchPrior  #: Prior of the candidates' wrench.
 
@@ -198,7 +198,7 @@ def two_state_odds(
 
 
 class ImmState(NamedTuple):
-    """State of the two-mode filter, of every search and direction of time."""
+    """State of the two-mode filter, of every search both ways."""
 
     b: Array  #: Mean of b in mode 0, 1. (2, S, n)
     x: Array  #: Mean of x in mode 1. (S, n)
@@ -285,7 +285,7 @@ def imm_update(state: ImmState, d: Array, white: Array, spike: Array, none: Arra
 
 
 def split_run(t: Array, wrench: WindowWrench, run: BlockSpan, jacobian: Array) -> list[BlockSpan]:
-    """A contact's blocks, split where force and torque pause between peaks."""
+    """A contact's blocks, split where force and torque pause."""
     inside = wrench.within(run)
     size = inside.size
     torque = np.linalg.norm(np.einsum("ki,kij->kj", inside.values, jacobian[slice(*run)]), axis=1)
@@ -303,7 +303,7 @@ def split_run(t: Array, wrench: WindowWrench, run: BlockSpan, jacobian: Array) -
 
 
 def split_at_turns(t: Array, force: Array, torque: Array, piece: BlockSpan) -> list[BlockSpan]:
-    """A contact's stretch, split at valleys between forces of different directions."""
+    """A contact's stretch, split between forces of different directions."""
     span = slice(*piece)
     at, there, load = t[span], force[span], torque[span]
     size = np.linalg.norm(there, axis=1)

@@ -72,7 +72,7 @@ class CheckedContact(NamedTuple):
     start: float  #: When it begins. [s]
     stop: float  #: When it ends. [s]
     peak_force: float  #: Its largest force, NaN if unknown. [N]
-    #: From its start to the first alarm; NaN where there is none, or no truth. [s]
+    #: From its start to the first alarm; NaN without one, or truth. [s]
     delay: float
     by: str  #: Joint or axis of the alarm, "" without one.
     #: Whether an earlier alarm was still on.
@@ -113,7 +113,7 @@ class ThresholdDetection(NamedTuple):
 
     @property
     def largest_missed(self) -> float:
-        """Peak force of the hardest missed contact, NaN if there is none. [N]"""
+        """Peak force of the hardest missed contact, NaN without one. [N]"""
         missed = [c.peak_force for c in self.contacts if not (c.by or c.already_above)]
         return float(np.fmax.reduce(missed, initial=np.nan))
 
@@ -178,7 +178,7 @@ class CountedAlarms(NamedTuple):
 
     log: str  #: The log.
     hours: float  #: Its length without the settling. [h]
-    due: float  #: The false alarms of any joint that the rate allows in that time.
+    due: float  #: False alarms of any joint that the rate allows.
     joints: tuple[int, ...]  #: Those of every joint alone.
     any_joint: int  #: Those of all joints together.
     any_axis: int  #: Those of all axes together.

@@ -34,7 +34,7 @@ LEAST_READINGS, AN_HOUR, SHARE = 30, 60.0, 5
 
 
 def block_maxima(t: Array, level: Array) -> Array:
-    """Largest value of every known 1 s block without settling, NaN ignored. (B,)"""
+    """Largest value of every known 1 s block behind the settling. (B,)"""
     used = t >= t[0] + SETTLING
     if np.count_nonzero(used) < 2:
         return np.zeros(0)
@@ -103,7 +103,7 @@ class Tail(NamedTuple):
 
 
 def tail_of(maxima: Array) -> Tail | None:
-    """The tail of block maxima (B,), None where there are fewer than five of them."""
+    """The tail of block maxima (B,), None of fewer than five."""
     hours = len(maxima) * BLOCK / 3600.0
     count = min(max(LEAST_READINGS, round(AN_HOUR * hours)), len(maxima) // SHARE)
     return Tail(np.sort(maxima)[::-1], count) if count else None
@@ -118,15 +118,15 @@ SELDOM = 0.5  #: A wrench known in a smaller share of samples gets a remark.
 
 
 class ComparedSignals(NamedTuple):
-    """Joint torques and wrench of one log, as they are compared with thresholds."""
+    """Joint torques and wrench of one log."""
 
     recording: Recording  #: The log.
     torque: Array  #: Estimated external torque. (T, n) [N·m]
     #: Force, then moment, NaN where the pose cannot tell them; no column for an arm of
     #: fewer than six joints. (T, 6) [N, N·m]
     wrench: Array
-    of_vendor: bool  #: Whether the torque is the robot's own estimate, not the observer's.
-    logged_wrench: bool  #: Whether the wrench is the robot's own, not that of the torque.
+    of_vendor: bool  #: Whether the torque is the robot's own estimate.
+    logged_wrench: bool  #: Whether the wrench is the robot's own.
     #: Axes of the wrench and the point of its moment, in words; "" without a wrench.
     frame: str
 
@@ -170,8 +170,8 @@ class SignalThreshold(NamedTuple):
     value: float  #: The threshold. [N·m, N]
     interval: tuple[float, float]  #: 95 % of it.
     rate: float  #: The false alarms that are this signal's share. [1/h]
-    log: str  #: The free log that it comes from: the one that needs the highest.
-    #: That log's tail; None of one too short for a tail that reads higher than the others'.
+    log: str  #: The free log that needs the highest.
+    #: That log's tail, None of one that is too short for it.
     tail: Tail | None
 
     @property
@@ -206,7 +206,7 @@ class Thresholds(Shown):
     #: Of the force's size, or none; as of an axis. [N]
     force: tuple[SignalThreshold, ...]
     of_vendor: bool  #: Whether the joints' are of the robot's own estimate.
-    logged_wrench: bool  #: Whether those of axes and force are of the robot's own wrench.
+    logged_wrench: bool  #: Whether the others are of the robot's own wrench.
     remarks: tuple[Remark, ...] = ()  #: Limits of the numbers.
 
     def _headline(self) -> str:
@@ -231,7 +231,7 @@ class Thresholds(Shown):
             yield name, level, unit, joined(one.interval), one.log
 
     def to_polars(self) -> "pl.DataFrame":
-        """One row a signal: threshold (null without one), interval, unit, rate, log."""
+        """One row a signal: threshold or null, interval, unit, rate, log."""
         import polars as pl
 
         names = ("signal", "threshold", "low", "high", "unit", "rate_per_h", "log")
@@ -241,7 +241,7 @@ class Thresholds(Shown):
         )
 
     def level(self, name: str, signals: ComparedSignals) -> Array:
-        """A set's signals in multiples of their thresholds, those without left out. (T, k)"""
+        """A set's signals in multiples of their thresholds. (T, k)"""
         values = [one.value if name == "joints" else one.level for one in getattr(self, name)]
         # An axis without a threshold raises no alarm.
         limits = np.nan_to_num(values, nan=np.inf)
@@ -288,7 +288,7 @@ def find_thresholds(free: Sequence[ComparedSignals], rate: float) -> Thresholds:
 def thresholds_of_set(
     free: Sequence[ComparedSignals], field: str, rate: float
 ) -> tuple[SignalThreshold, ...]:
-    """Thresholds of a set's signals, none if no log shows one; `find_thresholds`."""
+    """Thresholds of a set's signals, none if no log shows one."""
     signals = {log.recording.name: (log.t, abs(getattr(log, field)).T) for log in free}
     count = getattr(free[0], field).shape[1]
     share, found = rate / max(count, 1), []

@@ -50,7 +50,7 @@ class ContactPlace(NamedTuple):
 
     link: int  #: Number of the link; 0 for the flange.
     lever: float  #: SD of the moment over that of the force. [m]
-    jacobian: JacobianIn  #: J of its point, zero for joints that do not move it.
+    jacobian: JacobianIn  #: J of its point.
 
 
 def places(chain: Chain, q: Array) -> list[ContactPlace]:
@@ -65,7 +65,7 @@ def places(chain: Chain, q: Array) -> list[ContactPlace]:
 
 
 def jacobian_of(poses: Callable[[int, int], Pose], link: int, share: float) -> JacobianIn:
-    """J of a point along a link, window by window: a long log's would not fit."""
+    """J of a point along a link, in windows: a long log's would not fit."""
     return lru_cache(MOST_LANES)(lambda *window: link_jacobian(poses(*window), link, share))
 
 
@@ -139,7 +139,7 @@ LEAST_EVIDENCE = 12.0
 #: arms; 75 to 200 find the same contacts.
 LEAST_IN_MOTION = 120.0
 LEAST_FORCE = 10.0  #: Smallest SD of a force that is tried. [N]
-LONGEST_TIME = 1.0  #: Longest correlation time of a wrench that comes and goes. [s]
+LONGEST_TIME = 1.0  #: Longest correlation time of a moving wrench. [s]
 SIZES = 1.0, 3.0  #: Multiples of the SD that are tried.
 #: Longer candidates may also be a steady wrench, as a load's, of this correlation time:
 #: one that wanders pays for each block. [s]
@@ -272,7 +272,7 @@ def likelihoods(lanes: Sequence[Lane]) -> Array:
 
 
 def untouched_likelihood(lanes: Sequence[Lane], model: LinearModel) -> Array:
-    """Log likelihood of untouched lanes, each joint for itself. (L,) [nats]"""
+    """Log likelihood of untouched lanes, joint by joint. (L,) [nats]"""
     often = np.zeros_like(model.d)
     for place, lane in enumerate(lanes):
         inside = (lane.gate & lane.log.blocks.known)[:, None]

@@ -16,7 +16,7 @@ AUTOMATIC = "auto"  #: The word for what is chosen by the log at hand.
 
 
 SPAN = re.compile(r"[-+.\d]*:[-+.\d]*")  #: Two times with a colon, in any order.
-#: Most digits of a cycle's number: at a second each, a log of 99 999 cycles takes a day.
+#: Most digits of a cycle's number: 99 999 cycles of a second take a day.
 DIGITS = 5
 
 
@@ -66,7 +66,7 @@ class FreeChoice(Choice):
     ] = ()
     #: Free spans of the log itself, from and to. [s]
     spans: tuple[tuple[float, float], ...] = ()
-    #: The commanded period of a repeated motion, None to go by the positions alone. [s]
+    #: The commanded period, None to go by the positions alone. [s]
     period: Annotated[
         float | None,
         Option("two-cycle.period", "S", "Commanded period of a repeated motion; else found."),
