@@ -9,7 +9,7 @@ from vftcli.signals.option import ESTIMATE, Choice, Option, is_yes
 
 #: What the log allows: a bias for `best`, none for others.
 AUTOMATIC = "auto"
-#: The word for the bias fitted to the whole log and subtracted before observers run.
+#: The word for the bias fitted to the whole log.
 WHOLE_LOG = "whole-log"
 
 
@@ -32,5 +32,5 @@ class RefinementChoice(Choice):
 
     @property
     def corrects_all(self) -> bool:
-        """Whether every observer runs on what is left without the whole log's bias."""
+        """Whether every observer runs without the whole log's bias."""
         return self.bias == WHOLE_LOG

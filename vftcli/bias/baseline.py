@@ -23,20 +23,20 @@ from vftcli.signals.errors import ParameterError, ReferenceTorqueError, VftError
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.remarks import Remark, caution, fact
 
-STANDS = 0.5  #: Stiction limits a joint at rest in more than this share of the samples.
+STANDS = 0.5  #: Stiction limits a joint at rest for more than this share.
 
 
 @dataclass(frozen=True, kw_only=True)
 class Baseline:
     """Evidence of a log before any observer runs."""
 
-    motion: FreeMotion  #: The log and its free motion, without samples that stand alone.
+    motion: FreeMotion  #: The log and its free motion, steadied.
     part: FreePart | None = None  #: Its free part, None where there is none.
     #: Of the raw disturbance; None where the free part is short.
     spectra: Spectra | None = None
-    #: Why there is no free part, or are no spectra; None where there are both.
+    #: Why there is no free part, or no spectra; None with both.
     missing: Remark | None = None
-    #: A load that the free part carries and the model lacks, None where none shows.
+    #: A load of the free part that the model lacks, None where none shows.
     load: FreeLoad | None = None
     #: The whole log's bias, off the terms; None if none was fitted.
     correction: WholeLogBias | None = None
@@ -47,7 +47,7 @@ class Baseline:
     _made: dict[Run, Run] = field(init=False, repr=False, compare=False, default_factory=dict)
 
     def of(self, run: Run) -> Run:
-        """The log or one of its free runs, as the observers have it. Made once.
+        """The log or a free run as the observers have it. Made once.
 
         If a correction was looked for, without samples that stand alone.
         """
@@ -62,7 +62,7 @@ class Baseline:
         return self._made[run]
 
     def spare(self) -> None:
-        """Of a long log give back what the observers ran on; it can be made again."""
+        """Let go of what the observers ran on, of a long log."""
         if self.motion.log.recording.samples > LONG:
             self._made.clear()
 
@@ -81,7 +81,7 @@ class Baseline:
         return None if self.correction is None else self.correction.sd
 
     def measured(self, part: FreePart) -> Spectra:
-        """The spectra of the log outside of the free part, and of the free samples."""
+        """The spectra outside of the free part, and of the free samples."""
         # As the observers have them, less a load, which is no noise.
         free = [
             RunSamples(without_load(self.of(run), self.load), inside)
@@ -91,12 +91,12 @@ class Baseline:
 
     @property
     def pieces(self) -> tuple[RunSamples, ...]:
-        """The free samples, of the log itself and of free runs; none without a free part."""
+        """The free samples of the log and free runs, if any."""
         return self.part.pieces if self.part is not None else ()
 
     @property
     def untouched(self) -> tuple[RunSamples, ...]:
-        """The pieces in which nothing at all touches the arm, as far as it is known."""
+        """The pieces in which nothing at all is known to touch the arm."""
         return () if self.by_fit else self.pieces
 
     @property
@@ -114,7 +114,7 @@ class Baseline:
 
 
 def baseline_of(motion: FreeMotion) -> Baseline:
-    """Find the free part of a log and its spectra, or say why there are none."""
+    """Free part and spectra of a log, or why there are none."""
     bare = Baseline(motion=motion)
     try:
         part = motion.part
@@ -137,7 +137,7 @@ class Baselines:
     """Input of a log's observers."""
 
     plain: Baseline  #: What all but `best` run on.
-    #: What `best` runs on: less the bias of the whole log, where that was fitted.
+    #: What `best` runs on: less the whole log's bias, if fitted.
     best: Baseline
 
     def of(self, name: str) -> Baseline:
@@ -219,5 +219,5 @@ def on_quiet_samples(found: Baseline, quiet: Mask) -> Baseline:
     made = replace(found, part=part, load=free_load(part.pieces), by_fit=True, missing=None)
     try:
         return replace(made, spectra=made.measured(part))
-    except ParameterError:  # all of it or nothing is assumed free, or never long enough
+    except ParameterError:  # all of it or nothing is free, or never long enough
         return found

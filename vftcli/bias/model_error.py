@@ -28,7 +28,7 @@ from vftcli.robots.terms import GAP
 from vftcli.signals.arrays import Array, Indices, median_step, resample_columns, summed
 from vftcli.signals.filters import derivative, zero_phase
 
-#: What is faster is noise, or contact: the model's error follows the motion. [Hz]
+#: What is faster is noise, or contact. [Hz]
 CUTOFF = 6.0
 PLAY = 0.3e-3  #: Presliding length of the friction that may be missing. [rad]
 SMOOTHING = 0.003  #: Velocity over which its sign turns. [rad/s]
@@ -47,7 +47,7 @@ class SmoothMotion(NamedTuple):
     dq: Array  #: Velocities. (T, n) [rad/s]
     ddq: Array  #: Accelerations. (T, n) [rad/s²]
     gravity: Array  #: Gravity torque. (T, n) [N·m]
-    rigid: Array  #: Torque of the rigid body and its rotors, without friction. (T, n) [N·m]
+    rigid: Array  #: Torque of rigid body and rotors. (T, n) [N·m]
 
 
 def smooth_motion(run: Run) -> SmoothMotion:
@@ -112,7 +112,7 @@ def usual_friction(robot: Robot) -> Array:
 class ModelError(NamedTuple):
     """A value for each column: an error of the model, or its expected size."""
 
-    inertial: Array  #: Of the links' inertial parameters, in the regressor's order. (10n,)
+    inertial: Array  #: Of the links, in the regressor's order. (10n,)
     rotor: Array  #: Of the reflected rotor inertias. (n,) [kg·m²]
     drive: Array  #: Of the drive constants, as a share. (n,)
     friction: Array  #: Of the friction's shapes. (5, n)
@@ -125,7 +125,7 @@ class ModelError(NamedTuple):
         return np.concatenate([self.inertial, mine.ravel()])
 
     def torque(self, run: Run, motion: SmoothMotion) -> Array:
-        """The torque A δx that a model with this error asks for too little. (T, n) [N·m]
+        """Torque A δx that a model with this error lacks. (T, n) [N·m]
 
         The smooth motion is that of the coarse run.
         """
@@ -181,7 +181,7 @@ def expected_error(robot: Robot) -> ModelError:
 
 
 def friction_alone(robot: Robot) -> ModelError:
-    """The expected error of the shapes of friction, and none of anything else."""
+    """The expected error of friction's shapes alone."""
     expected = expected_error(robot)
     none = ModelError(*(0.0 * values for values in expected))
     return none._replace(friction=expected.friction)
@@ -190,7 +190,7 @@ def friction_alone(robot: Robot) -> ModelError:
 def error_columns(
     run: Run, motion: SmoothMotion, expected: ModelError, stride: int
 ) -> list[Array]:
-    """Each joint's rows of A, columns `column_numbers` times their deviations. (S, p)"""
+    """Each joint's rows of A, `column_numbers`, times their SDs. (S, p)"""
     n, kept, sds = run.robot.joints, slice(None, None, stride), expected.values
     shapes = [
         motion.dq[kept] if k == SHAPES - 2 else zero_phase(motion.t, shape, CUTOFF)[kept]

@@ -35,15 +35,22 @@ STICTION = "stiction at rest"
 def with_band(found: Baseline, reading: FreeReading) -> ExternalTorque:
     """The estimate with its band, marked in motion; itself if nothing is known."""
     estimate, spectra, run = reading.estimate, found.spectra, found.motion.log
-    called = fitted_error(found, reading)
+    called, off, tau = None, found.correction, estimate.tau
+    if off is not None and np.count_nonzero(off.free) >= ENOUGH:
+        # Slow loads of the fit are no error of a reading, nor, without any, is the free part's.
+        if off.load.any():
+            tau = tau - resample_columns(run.t, fitted_times(run), off.load)
+        elif found.load is not None:
+            tau = tau - found.load.torque(run)
+        called = free_error(tau[off.free], run.rests[off.free], run.dry_friction)
     if spectra is not None and len(reading.samples):
         asked = spectra.frequency, spectra.step, spectra.joints
         missed = spectra.missed(reading.observer.frequency_response(*asked))
         error = free_error(reading.samples, reading.resting, run.dry_friction)
         if called is not None and found.by_fit:
-            error = called  # the free part is these samples, and loads in them are no error
+            error = called  # the free part is these samples; their loads are no error
         elif called is not None:
-            # They count too, as a stated part is short and often at rest: the larger of both.
+            # A stated part is short and often at rest: the larger of both counts.
             moving = np.maximum(error.moving, called.moving)
             resting = np.maximum(error.resting, called.resting)
             error = FreeError(moving, resting, unseen=error.unseen & called.unseen)
@@ -79,21 +86,6 @@ def stated_band(found: Baseline, called: FreeError | None) -> Array:
     return error_band(
         held, nothing, run.rests, resample_columns(run.t, fitted_times(run), spread)
     )
-
-
-def fitted_error(found: Baseline, reading: FreeReading) -> FreeError | None:
-    """Readings in the correction fit's free samples; None in too few.
-
-    Slow loads of the fit are no error of a reading, nor is the free part's where it has none.
-    """
-    run, tau, off = found.motion.log, reading.estimate.tau, found.correction
-    if off is None or np.count_nonzero(off.free) < ENOUGH:
-        return None
-    if off.load.any():
-        tau = tau - resample_columns(run.t, fitted_times(run), off.load)
-    elif found.load is not None:
-        tau = tau - found.load.torque(run)
-    return free_error(tau[off.free], run.rests[off.free], run.dry_friction)
 
 
 def band_remarks(found: Baseline) -> list[Remark]:
@@ -159,12 +151,12 @@ class Refinement(Shown):
     """Estimates of a complete log, with bands and limits."""
 
     estimates: tuple[ExternalTorque, ...]  #: The estimates with their bands.
-    baselines: Baselines  #: The log's free part and spectra, as the observers have them.
-    curves: Mapping[str, Curve]  #: Observer that was tuned → the curve that was minimised.
+    baselines: Baselines  #: The log's free part and spectra.
+    curves: Mapping[str, Curve]  #: Tuned observer → the minimised curve.
     #: Best observer → RMS of its error by cause; none without spectra. (n,) [N·m]
     budget: Mapping[str, Mapping[str, Array]]
     removed: str  #: What ``bias.method`` asked for.
-    remarks: tuple[Remark, ...]  #: What the reader of the estimates should know.
+    remarks: tuple[Remark, ...]  #: Remarks on the estimates.
 
 
 def refine(

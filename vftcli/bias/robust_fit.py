@@ -70,7 +70,7 @@ class SlowLoads(NamedTuple):
 
 
 def slow_loads(chain: Chain, t: Array, q: Array) -> SlowLoads:
-    """Columns of slow external loads at times t (S,) [s] and positions q (S, n) [rad]."""
+    """Columns of slow loads at times t (S,) [s], positions q (S, n) [rad]."""
     n, poses = chain.joints, link_poses(chain, q)
     # At the flange, before the elbow's joint, before the wrist's.
     links = n, *sorted({j for j in ((n + 1) // 2 - 1, n - 3) if j > 0})
@@ -140,7 +140,7 @@ class Rows:
     def sums(
         self, weight: Array, chosen: Mask | None = None, parts: Sequence[Mask] = ()
     ) -> list[NormalEquations]:
-        """Sums of all columns, of model and loads, over some samples, then over parts.
+        """Sums of all columns over some samples, then over parts.
 
         The rows have weights (S, n); no samples (S,) means all. Parts (S,) may overlap.
         """
@@ -250,7 +250,7 @@ def fit_robustly(rows: Rows, step: float, dry: Array) -> WholeLogFit:
 
 
 def first_fit(rows: Rows, step: float, counted: float, least: Array) -> tuple[Array, Array]:
-    """Residual (S, n) without loads, suspicious samples weighed down; its scale.
+    """Residual (S, n) without loads, and its scale.
 
     So many samples count as one; the scale (n,) is at `least` (n,). [N·m]
     """
@@ -277,7 +277,7 @@ def first_fit(rows: Rows, step: float, counted: float, least: Array) -> tuple[Ar
 
 
 def free_samples(worst: Array, step: float) -> Mask:
-    """Samples free of contact by all joints' scaled residuals; all if too few. (S,)"""
+    """Samples without contact by scaled residuals; all if too few. (S,)"""
     # rounding of a step must not shorten such a run
     runs = [run for run in runs_of(worst > CONTACT) if (run[1] - run[0]) * step >= LASTS - 1e-9]
     free = ~covered(runs, len(worst), margin=round(GROWN / step))

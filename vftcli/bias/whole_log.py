@@ -84,7 +84,7 @@ class WholeLogBias:
     #: External torque of the fit's slow loads, kept in estimates; or zero. At
     #: `fitted_times`. (S, n) [N·m]
     load: Array
-    remarks: tuple[Remark, ...]  #: What was applied, and what was not and why.
+    remarks: tuple[Remark, ...]  #: What was applied, or why not.
     fitted: bool = True  #: Whether there was a fit; else `free` and `load` say nothing.
     #: The model's error on the joints left alone too, None where nothing was fitted.
     error: ModelError | None = field(default=None, repr=False)
@@ -110,7 +110,7 @@ class WholeLogBias:
 
 
 def whole_log_bias(run: Run) -> WholeLogBias:
-    """The model's bias along a log, of each joint where it predicts unseen samples."""
+    """The model's bias along a log, where it predicts unseen samples."""
     run = run.steadied
     terms, coarse = run.terms, run.coarse
     span, refused = motion_of(coarse)
@@ -151,7 +151,7 @@ def whole_log_bias(run: Run) -> WholeLogBias:
 
 
 def motion_of(run: Run) -> tuple[float, Remark | None]:
-    """Length of a log's motion [s], and a remark if it shows no error of the model."""
+    """Length of a log's motion [s], and a remark if it shows no error."""
     t, dq = without_waits(run.t), run.dq
     duration = t[-1] - t[0]
     if duration < LEAST_FRICTION:
@@ -234,7 +234,7 @@ def bias_of(
 
 
 def remarks_of(found: Guarded, changed: Array, free_share: float) -> tuple[Remark, ...]:
-    """Joints that were corrected, by how much (n,) [N·m] rms, and those left alone."""
+    """Joints corrected, by how much (n,) [N·m] rms, and those left alone."""
     on, share = found.weight > 0.0, found.share
     values = {"changed_Nm": changed[on], "free_share": free_share}
     applied = fact("whole-log-applied", on_joints(on), unseen_share=share[on], **values)

@@ -184,16 +184,6 @@ class SignalThreshold(NamedTuple):
         """The threshold of an axis or of the force's size, NaN if wide. [N, N·m]"""
         return float("nan") if self.is_wide else self.value
 
-    @property
-    def more_share(self) -> float:
-        """Share of more motion that narrows a wide interval to the value."""
-        if self.tail is None:
-            return 0.0
-        width = (self.interval[1] - self.interval[0]) / max(self.value, LEAST)
-        count = self.tail.size * width**2
-        blocks = SHARE * count if count <= LEAST_READINGS else count / AN_HOUR * 3600.0 / BLOCK
-        return max(blocks / len(self.tail.maxima) - 1.0, 0.0)
-
 
 @record
 class Thresholds(Shown):
@@ -272,7 +262,15 @@ def find_thresholds(free: Sequence[ComparedSignals], rate: float) -> Thresholds:
     named = (*zip(AXES, axes, strict=False), *(("|F|", one) for one in force))
     if wide := {name: one for name, one in named if one.is_wide}:
         lengths = {signals.recording.name: signals.recording.duration for signals in free}
-        more = max(one.more_share * lengths[one.log] / 60.0 for one in wide.values())
+        more = 0.0
+        for one in wide.values():
+            if one.tail is not None:
+                # So many readings narrow its interval to the value.
+                count = one.tail.size * (np.ptp(one.interval) / max(one.value, LEAST)) ** 2
+                rare = count <= LEAST_READINGS
+                blocks = SHARE * count if rare else count / AN_HOUR * 3600.0 / BLOCK
+                share = blocks / len(one.tail.maxima) - 1.0
+                more = max(more, share * lengths[one.log] / 60.0)
         remarks.append(caution("axes-too-wide", axes=", ".join(wide), more_min=more))
     return Thresholds(
         rate=rate,

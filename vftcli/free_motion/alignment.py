@@ -32,7 +32,7 @@ LEAST_ALIKE = 0.001
 RIVALS = 40  #: Most shifts of longer overlap to try.
 COARSE = 300  #: Instants compared in the search for a shared part.
 
-#: Largest distance at another speed or clock, by the motion's own spread: true pairs
+#: Largest distance at another speed, by the motion's own spread: true pairs
 #: leave .003, other motions with a fitting rate 1.3 and more.
 SAME_PATH = 0.1
 
@@ -90,7 +90,7 @@ def align(recording: Recording, free: Recording) -> Alignment:
 
 
 def is_same_path(recording: Recording, found: Alignment) -> bool:
-    """Whether the overlap at a rate is one path, not two small motions nearby."""
+    """Whether the overlap at a rate is one path, not two nearby."""
     spread = np.sqrt(recording.q[found.overlap].var(axis=0).mean())
     return bool(found.deviation <= SAME_PATH * spread)
 
@@ -267,7 +267,7 @@ def robust_equations(slopes: Array, distance: Array) -> tuple[Array, Array]:
 def aligned_at(
     recording: Recording, free: Recording, shift: float, rate: float, within: Mask | None = None
 ) -> Alignment:
-    """Alignment of two logs at a shift [s] and rate, in the overlap or `within`. (T,)
+    """Alignment of two logs at a shift [s] and rate, perhaps `within`. (T,)
 
     The deviation is infinite for fewer than two samples.
     """

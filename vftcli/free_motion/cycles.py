@@ -15,25 +15,25 @@ from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, fact
 from vftcli.signals.rest import standing
 
-LEAST_REPEATED = 0.15  #: Share of the moving part of the log that must be there twice.
+LEAST_REPEATED = 0.15  #: Least share of the motion that must be there twice.
 
-#: A quarter of the positions must return, within this share of their spread: pushes deflect.
+#: A quarter of the positions must return, within this share of their spread.
 RETURNS = 0.015
 
 #: A valley is worth refining if a quarter of the samples come back within this share.
 SHORTLIST = 0.15
 CANDIDATES = 40  #: Valleys looked at, the deepest ones.
-SEARCHED = 0.01  #: Clock on which a period is looked for, where the log's is finer. [s]
+SEARCHED = 0.01  #: Finest clock on which a period is looked for. [s]
 MULTIPLES = 12  #: Multiples of the period that refine it.
 #: How far from a stated period the true one is looked for, relative: clocks drift.
 AROUND = 0.03
-ENOUGH = 2560  #: Samples that choose and refine a period: more of them only take longer.
+ENOUGH = 2560  #: Samples that refine a period: more only take longer.
 #: Spans this many times what the samples fill at their usual step are gaps, not motion.
 SPARSE = 10.0
 
 #: How near a sample is to itself one period away. [rad]
 ON_PATH = 0.1
-COMPLETE = 0.97  #: Share of a cycle that must be in the log for it to count as whole.
+COMPLETE = 0.97  #: Least share of a cycle that counts as whole.
 
 #: Expected errors to the freest cycle within which one is free too.
 ALIKE = 1.5
@@ -45,7 +45,7 @@ class Period(NamedTuple):
     """A motion's period."""
 
     seconds: float  #: On the log's own clock. [s]
-    #: Lower quartile over time of the joint-position distance after one period. [rad]
+    #: Lower quartile of the positions' distance after one period. [rad]
     deviation: float
 
 
@@ -104,7 +104,7 @@ def find_period(recording: Recording, stated: float | None = None) -> Period:
 
 
 def moving_part(recording: Recording) -> tuple[Array, Array]:
-    """Clock [s] and positions [rad] without the rest before and after the motion."""
+    """Clock [s] and positions [rad] from the first to the last motion."""
     t, q = recording.t, recording.q
     if recording.samples < 8:
         raise ReferenceTorqueError(
@@ -123,7 +123,7 @@ def moving_part(recording: Recording) -> tuple[Array, Array]:
 
 
 def valleys(x: Array, step: float, stated: float | None) -> list[float]:
-    """Lags at which x comes nearest to itself with overlap, shortest first. [samples]"""
+    """Lags at which x is nearest to itself, shortest first. [samples]"""
     x, lags = x - x.mean(axis=0), np.arange(len(x))
     cross, behind, ahead = overlapping(x, x, lags)
     # Mean squared distance of x to x so many samples later.
@@ -144,7 +144,7 @@ def valleys(x: Array, step: float, stated: float | None) -> list[float]:
 
 
 def returned(t: Array, q: Array, seconds: float, every: int = 1) -> float:
-    """Lower quartile of the distance of q to q `seconds` later, one in `every`. [rad]"""
+    """Lower quartile of q's distance to itself `seconds` later. [rad]"""
     here, path = t[::every], q[::every]
     inside = here + seconds <= t[-1]
     distance = resample_columns(here[inside] + seconds, t, q) - path[inside]
@@ -195,7 +195,7 @@ class Cycles(NamedTuple):
         return max(int((self.end - self.begin) / self.period + 1.0 - COMPLETE), 0)
 
     def number(self, t: Array) -> Indices:
-        """Cycle of each instant, from 0; −1 before the first and after the last. (T,)"""
+        """Cycle of each instant, from 0; −1 before and after all. (T,)"""
         cycle = np.floor((t - self.begin) / self.period).astype(np.int64)
         return np.where((t < self.begin) | (t > self.end), -1, cycle)
 
@@ -262,7 +262,7 @@ class FreeCycles(NamedTuple):
         return tuple(self.numbers[k] for k in at)
 
     def remarks(self, whole: int) -> list[Remark]:
-        """Remarks on the free cycles among the whole ones, and on those paired if few."""
+        """Remarks on the free cycles, and on those paired if few."""
         count = len(self.numbers)
         named, drawn = ([k + 1 for k in numbers] for numbers in (self.numbers, self.drawn))
         if self.residuals is None:
@@ -311,7 +311,7 @@ def find_free_cycles(motion: Run, cycles: Cycles) -> FreeCycles:
 
 
 def residuals(motion: Run, cycles: Cycles) -> Array:
-    """Mean over joints of each cycle's residual relative to the smallest. (cycles,)
+    """Mean of the joints' residuals over their smallest. (cycles,)
 
     A cycle of which a gap takes more than half has none: ∞.
     """

@@ -1,4 +1,4 @@
-"""The two-cycle difference: partners of a log's samples in its free runs, best way last.
+"""The two-cycle difference: a log's samples less their partners in free runs.
 
 Partners go by a clock, or by the nearest place on the joint-space path. The error of each
 way follows from the logs themselves, by sample and joint.
@@ -26,7 +26,7 @@ from vftcli.signals.errors import ReferenceTorqueError
 from vftcli.signals.filters import band_pass, low_pass, noise_passed
 from vftcli.signals.remarks import Remark, fact
 
-FARTHEST = 0.1  #: How far phase may lie from the clock's word, as the low-passed shift. [s]
+FARTHEST = 0.1  #: How far phase may lie from the clock. [s]
 #: Cutoff of the joint-space phase shift: a servo's compliance is slower. [Hz]
 PHASE_CUTOFF = 8.0
 #: A stop this long leaves all of the dry friction open. [s]
@@ -38,8 +38,8 @@ REPEATED = 0.5
 class Pairing(NamedTuple):
     """A free run, and where in it each sample of the log belongs."""
 
-    free: Run  #: The free run; the log itself where cycles of one log are compared.
-    times: Array  #: Instant on the free run's clock, NaN where there is none. (T,) [s]
+    free: Run  #: The free run, or the log itself with its cycles.
+    times: Array  #: Instant on the free run's clock, or NaN. (T,) [s]
 
     @property
     def known(self) -> Mask:
@@ -138,7 +138,7 @@ class PairedRuns:
 
     @cached_property
     def stopped(self) -> Array:
-        """Share of dry friction that a stop leaves open, log or free run, 0–1. (T, n)"""
+        """Share of dry friction that a stop leaves open, 0–1. (T, n)"""
         longest = self.motion.standstill.copy()
         shortest = longest.copy()
         for p in self.pairings:
@@ -151,7 +151,7 @@ class PairedRuns:
 
     @cached_property
     def misfit(self) -> Array:
-        """Share of torque variation missed by the model in the free run, ≤ 1. (n,)"""
+        """Share of the free run's torque that the model misses, ≤ 1. (n,)"""
         missed = total = np.zeros(self.motion.drive_torque.shape[1])
         for p in self.pairings:
             free = p.free.coarse
@@ -165,7 +165,7 @@ class PairedRuns:
 
 
 LOW_PASS = 12.0  #: Default cutoff of the zero-phase low-pass. [Hz]
-#: A rung further up, or the low-pass, must bring the expected error down to this share.
+#: A rung further up, or the low-pass, must leave this share of the error.
 WORTH = 0.97
 #: Least band of a noise estimate: contacts fill lower ones. [Hz]
 LEAST_BAND = 12.0
@@ -196,12 +196,6 @@ class ErrorModel(NamedTuple):
         return np.asarray(np.isfinite(self.sd).all(axis=1))
 
     @property
-    def trusted_joints(self) -> Mask:
-        """Joints with motion enough to cancel friction; all if none has. (n,)"""
-        trusted = self.standing_share <= 1.0 - TRUSTED_SHARE
-        return trusted if trusted.any() else np.ones_like(trusted)
-
-    @property
     def floor(self) -> Array:
         """RMS of `sd` over samples with a reference. (n,) [N·m]"""
         return rms(self.sd, np.isfinite(self.sd))
@@ -222,8 +216,8 @@ class Rung(NamedTuple):
     """One way of alignment."""
 
     clock: str  #: The pairing it starts from: "commanded" or "found".
-    phase: bool  #: Whether partners are moved to the nearest place on the joint-space path.
-    corrected: bool  #: Whether the motion difference's model torque is subtracted.
+    phase: bool  #: Whether partners are the nearest on the joint-space path.
+    corrected: bool  #: Whether the model's torque of the difference is subtracted.
     title: str  #: What it does, in words.
 
 
@@ -303,13 +297,16 @@ def difference(pair: PairedRuns, name: str, cutoff: float | None) -> Difference:
 
 
 def most_certain(made: Iterable[Difference]) -> tuple[Difference, list[Remark]]:
-    """The difference of least expected error, the simpler of equals; floors of all.
+    """The difference of least expected error, and floors of all.
 
     By the mean over trusted joints of expected error in motion, over the lowest rung's.
     """
     steps = iter(made)
     chosen = next(steps)
-    lowest, trusted, least = chosen.error.floor_moving, chosen.error.trusted_joints, 1.0
+    lowest, least = chosen.error.floor_moving, 1.0
+    # Joints with motion enough to cancel friction; all if none has.
+    trusted = chosen.error.standing_share <= 1.0 - TRUSTED_SHARE
+    trusted |= not trusted.any()
     floors = [chosen.remark("alignment-floor", floor_Nm=chosen.error.floor)]
     for candidate in steps:
         floors.append(candidate.remark("alignment-floor", floor_Nm=candidate.error.floor))
@@ -392,7 +389,7 @@ def noise_below(
     cutoff: float,
     slope: int = 0,
 ) -> Array:
-    """Noise below a cutoff, dense as in a band [Hz], differentiated by `slope`. (n,)"""
+    """Noise below a cutoff, dense as in a band [Hz]. (n,)"""
     dense = rms(band_pass(t, x, *limits), moving) / np.sqrt(noise_passed(step, limits))
     return np.asarray(dense * np.sqrt(noise_passed(step, cutoff, slope)))
 
@@ -434,7 +431,7 @@ def off_line(x: Array, size: int) -> Array:
 
 @cache
 def white_when_quiet(size: int, step: float, cutoff: float | None) -> float:
-    """Square of `noise_when_quiet` of white noise over its variance, drawn once."""
+    """Square of `noise_when_quiet` of white noise over its variance."""
     noise = np.random.default_rng(SEED).standard_normal((400 * size, 1))
     clock = step * np.arange(len(noise), dtype=float)
     smooth = noise if cutoff is None else low_pass(clock, noise, cutoff)
@@ -442,7 +439,7 @@ def white_when_quiet(size: int, step: float, cutoff: float | None) -> float:
 
 
 def at(chosen: Mask, x: Array) -> Array:
-    """The chosen samples (T,) of a series (T, n), its columns contiguous. (S, n)"""
+    """The chosen samples (T,) of a series, its columns contiguous. (S, n)"""
     return np.compress(chosen, x.T, axis=1).T
 
 

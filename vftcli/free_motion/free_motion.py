@@ -49,7 +49,7 @@ from vftcli.signals.shown import Shown
 
 #: Joints that move less only yield to pushes. [rad]
 SWAY = 0.1
-#: A cycle counts as inside a span if it sticks out by no more than this share of itself.
+#: A cycle inside a span may stick out by this share of itself.
 SLACK = 0.03
 
 
@@ -170,7 +170,7 @@ class FreeMotion(Shown):
 
     @cached_property
     def known(self) -> FreePart:
-        """The free part: the given spans and runs, else the free cycles of the log."""
+        """The given spans and runs, else the free cycles of the log."""
         log, choice, t = self.log, self.choice, self.log.t
         own, spans = within(t, choice.spans), choice.spans
         if spans and (np.count_nonzero(own) < 2 or own.all()):
@@ -198,7 +198,7 @@ class FreeMotion(Shown):
 
     @cached_property
     def part(self) -> FreePart:
-        """The free part, with the place of each free run among its remarks."""
+        """The free part, with remarks on each free run's place."""
         paired = []
         for run in self.runs:
             about = Where(about=run.recording.name)
@@ -209,16 +209,16 @@ class FreeMotion(Shown):
         return self.known._replace(remarks=(*self.known.remarks, *paired))
 
     def unloaded(self, spans: tuple[tuple[float, float], ...]) -> "FreeMotion":
-        """The log with its unloaded spans as free motion, where none is given."""
+        """The log with its unloaded spans free, where none is given."""
         if self.choice.is_given or not spans:
             return self
         return replace(self, choice=replace(self.choice, spans=spans))
 
 
-#: A load from which it is one: drive constants that are 3 % off look like .3 kg. [kg]
+#: Least load: drive constants that are 3 % off look like .3 kg. [kg]
 LEAST = 0.4
 SURE = 4.0  #: SDs that it has to be.
-PARTLY = 0.8  #: Share of the free part's disturbance that it may leave at most.
+PARTLY = 0.8  #: Most of the free part's disturbance that it may leave.
 CUTOFF = 6.0  #: Where the disturbance is low-passed before it is weighed. [Hz]
 RATE = 30.0  #: RunSamples a second that are weighed.
 #: The model's errors are alike for so long: one sample. [s]
@@ -268,7 +268,7 @@ class FreeLoad:
 
 
 def without_load(run: Run, load: FreeLoad | None) -> Run:
-    """A run whose model carries a load as a point mass; itself where there is none.
+    """A run whose model carries a load; itself without one.
 
     By its weight alone every start and stop would look like a push.
     """

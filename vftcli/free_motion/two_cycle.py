@@ -54,7 +54,7 @@ def two_cycle_reference(motion: FreeMotion) -> ExternalTorque:
     moving = np.isfinite(chosen.tau) & ~chosen.error.standing
     # Cycles of one log lie too close in time for friction to change between them.
     change = friction_change(log, chosen.tau, moving) if motion.runs else np.zeros(len(scale))
-    # Friction changes while a joint moves; the scale was measured while it moved, too.
+    # Friction changes in motion, in which the scale was measured too.
     wider = np.hypot(chosen.error.sd * scale, change)
     sd = np.where(chosen.error.standing, chosen.error.sd, wider)
     return ExternalTorque(
@@ -129,11 +129,11 @@ def measured_scale(
     if len(pairings) < 2:
         return None
     if not motion.runs:
-        # A sample of a free cycle is itself free, so that its difference is all error.
+        # A free cycle's samples are free: their difference is all error.
         free = np.isin(motion.cycles.number(motion.log.t), motion.free_cycles.numbers)
         return error_ratio(chosen, free & chosen.error.known)
     ratios = []
-    # Every pair both ways round: which run is named first must not decide the floor.
+    # Every pair both ways round: the order must not decide the floor.
     for first, second in permutations(pairings, 2):
         shared = first.known & second.known
         if np.count_nonzero(shared) < 2:
@@ -186,7 +186,7 @@ def friction_change(motion: Run, tau: Array, moving: Mask) -> Array:
 
 
 def floor_remarks(chosen: Difference, measured: Array | None, change: Array) -> list[Remark]:
-    """Origin of the floor, joints without one, and joints with changed friction."""
+    """Origin of the floor; joints that stand or have another friction."""
     remarks = [fact("floor-propagated")]
     if measured is not None:
         remarks = [fact("floor-measured", ratio=measured)]

@@ -99,7 +99,7 @@ class ContactSpan(NamedTuple):
 
 
 def find_contacts(motion: PreparedLog, residual: Array, dry: Array) -> list[ContactSpan]:
-    """Stretches with a residual (M, n) far above the log's, neighbours joined. [N·m]
+    """Stretches with a large residual (M, n), neighbours joined. [N·m]
 
     Near a reversal a joint may stick: only torque above dry friction (M, n) counts.
     """

@@ -55,7 +55,7 @@ RESIDUALS = pl.Schema(
 EXPLAINS = 0.4  #: Least share of a residual that a named cause explains.
 HEAVY = 0.3  #: Smallest load of a remark. [kg]
 ENOUGH = 50  #: Fewest samples in motion for a remark on friction.
-WORSE = 1.5  #: Multiple of the training's residual for a remark on a held-out joint.
+WORSE = 1.5  #: Least multiple of the training's residual in a remark.
 #: Least ratio of the model's rest of a log to the profile's in a remark.
 BEHIND = 1.01
 NEAR = 0.01  #: Largest joint distance of samples at one place. [rad]
@@ -133,7 +133,7 @@ def score(log: Recording, role: str, profile: Robot, robot: Robot, cutoff: float
 
 
 def score_remarks(traces: Sequence[Trace]) -> Iterator[Remark]:
-    """Remarks on worse or repeated logs, and on joints much worse elsewhere."""
+    """Remarks on worse or repeated logs, and on worse joints."""
     train, held_out = ([t for t in traces if t.role == role] for role in ("train", "held-out"))
     for trace in traces:
         left, before = trace.rms.mean(), trace.before.mean()
@@ -284,7 +284,7 @@ def with_provenance(
     trained: Sequence[Recording],
     load: LoadFit | None,
 ) -> Robot:
-    """The identified robot under its own name, with the source of every number."""
+    """The identified robot, with the source of every number."""
     profile = found.profile
     named = replace(
         found.robot,

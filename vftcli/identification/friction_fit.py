@@ -129,7 +129,7 @@ class JointFit(NamedTuple):
     scores: dict[Shape, float]
     constant: bool  #: Whether the drive constant was fitted too.
     presliding: PreslidingScore  #: The presliding length of all joints.
-    #: RMS missed by the model, and by the profile's friction and rotor, in stretches left out;
+    #: RMS missed by the model, and by the profile's numbers, in stretches left out;
     #: NaN if not compared. [N·m]
     errors: tuple[float, float] = (np.nan, np.nan)
 
@@ -157,7 +157,7 @@ def fit_frictions(data: Training) -> dict[int, JointFit]:
     presliding, fits = choose_presliding(joints), dict[int, JointFit]()
     for j in moving:
         fit = fit_joint(data, j, presliding, data.fit_constants)
-        # A light joint cannot separate its constant, the last value, from friction.
+        # A light joint cannot tell its constant, the last value, from friction.
         if data.fit_constants and fit.fit.sd[-1] >= CONSTANT_KNOWN * abs(fit.fit.values[-1]):
             fit = fit_joint(data, j, presliding, False)
         fits[j] = fit
@@ -199,7 +199,7 @@ def data_of_joint(data: Training, j: int, constant: bool) -> JointData:
 
 
 def all_residuals(data: Training, fits: Mapping[int, JointFit]) -> list[Array]:
-    """Residuals of the friction fits, log by log; zero for held joints. (M, n) each"""
+    """Residuals of the fits, log by log; zero for held joints. (M, n) each"""
     ends = np.cumsum([log.samples for log in data.logs])
     whole = np.zeros((ends[-1], data.robot.joints))
     for j, fit in fits.items():

@@ -29,15 +29,15 @@ from vftcli.signals.estimation import FOLDS, correlation_time, folds, huber, rob
 #: One row a base parameter, or a friction coefficient beside them.
 BASE = pl.Schema({"parameter": str, "value": float, "sd": float, "determined": bool})
 ROWS = 512  #: Samples stacked at once.
-REWEIGHTINGS = 3  #: Passes of reweighting; each evaluates the regressor twice.
-#: Singular values below this share of the largest stay at the start (columns scaled).
+REWEIGHTINGS = 3  #: Passes of reweighting.
+#: Singular values below this share of the largest stay at the start.
 TRUNCATION = 1e-3
 PROBES = 400  #: Random states for the structure of base parameters.
 #: Diagonal entries of R below this share of the largest are zero: rounding is at 1e-15.
 RANK_TOLERANCE = 1e-8
 #: Least relative deviation of an undetermined parameter.
 DOUBTFUL = 0.3
-#: Weights of the distance to the profile, from hardly any pull to the profile itself.
+#: Weights of the distance to the profile, the weakest pull first.
 WEIGHTS = (1e-2, 1e-1, 1.0, 1e1, 1e2, 1e3, 1e4)
 MARGIN = 1.01  #: Factor of the least misfit within which a pull counts as good.
 #: Pull of a maker's table with masses of 5 % SD: the distance of
@@ -55,7 +55,7 @@ class Triangles(NamedTuple):
     """The logs' stacked, weighted equations A x ≈ y, as R factors of [A y]."""
 
     layout: ParameterColumns  #: The unknowns.
-    parts: tuple[Array, ...]  #: R factor of each stretch left out. (size+1, size+1) each
+    parts: tuple[Array, ...]  #: R factor of each stretch. (size+1, size+1) each
     correlation: float  #: Samples that count as one: residuals correlate.
 
     def joined(self, leave_out: int | None = None) -> tuple[Array, Array]:
@@ -206,7 +206,7 @@ def base_parameters(triangles: Triangles, start: Array) -> pl.DataFrame:
 
 
 def pseudo_inertias(phi: Array) -> Array:
-    """Pseudo-inertia P of each link from all inertial parameters (10n,). (n, 4, 4)"""
+    """Pseudo-inertia P of each link by all parameters (10n,). (n, 4, 4)"""
     rows = phi.reshape(-1, LINK)
     P, tensor = np.zeros((len(rows), 4, 4)), np.zeros((len(rows), 3, 3))
     for (r, c), values in zip(TENSOR, rows[:, 4:].T, strict=True):

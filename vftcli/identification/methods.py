@@ -57,7 +57,7 @@ UNITS = {
 DETERMINED = 0.3
 #: SDs from a profile's rotor inertia to its replacement.
 REFUTED = 3.0
-#: Ratio of measured to expected torque below which a current does not follow it.
+#: Least ratio of measured to expected torque of a current.
 LEAST_SLOPE = 0.05
 
 
@@ -70,7 +70,7 @@ class Number(NamedTuple):
     sd: float  #: Its SD.
     unit: str  #: Unit of value, sd and profile.
     profile: float  #: The profile's number, NaN without one.
-    determined: bool  #: Whether the logs determine it; if not, it is not written.
+    determined: bool  #: Whether it is determined, and written.
 
 
 def number(
@@ -89,8 +89,8 @@ class MethodResult(NamedTuple):
     numbers: Sequence[Number] = ()  #: Its identified numbers.
     remarks: Sequence[Remark] = ()  #: Limits of the numbers.
     fits: Mapping[int, JointFit] = {}  #: Joint, from 0 → its fit of friction.
-    base: pl.DataFrame | None = None  #: Base parameters (`BASE`), if the method has them.
-    is_narrow: bool = False  #: Whether the motion shows too little of the links.
+    base: pl.DataFrame | None = None  #: Base parameters (`BASE`), if any.
+    is_narrow: bool = False  #: Whether the motion shows few links.
 
 
 def friction_method(data: Training, fitted: CleanFit | None = None) -> MethodResult:
@@ -156,7 +156,7 @@ def by_constant(data: Training, j: int, values: Array, sd: Array) -> tuple[Array
 
 
 def rotor_number(j: int, value: float, sd: float, before: float) -> tuple[Number, list[Remark]]:
-    """Rotor inertia of joint j (from 0) [kg·m²], a remark where it is not known.
+    """Rotor inertia of joint j (from 0) [kg·m²], remarks if not known.
 
     Also determined if `REFUTED` sd off the profile's.
     """
@@ -256,7 +256,7 @@ def profile_friction(robot: Robot) -> tuple[JointFriction, ...]:
 NARROW = 0.7
 #: That share if the weakest pull predicts best, as in rounds of one motion.
 MOST = 0.5
-#: Share of a joint's torque that the profile's links must leave before others are tried.
+#: Share of a joint's torque from which other links are tried.
 MATTERS = 0.02
 
 
@@ -289,7 +289,7 @@ def whole_arm(data: Training) -> MethodResult:
     for j, fit in fits.items() if data.rubs else ():
         place = layout.frictions[j]
         values, sd = x[place], base["sd"].to_numpy()[place.start + behind : place.stop + behind]
-        # Beside errors of the links a rise may fall; the joint's own fit does not.
+        # Beside errors of the links it may fall; the joint's own fit does not.
         if not is_dissipative(fit.shape, values, data.top_speed(j)):
             values = fit.fit.values
         frictions[j], more = identified_friction(data, j, fit.shape, values, sd, "base")

@@ -38,7 +38,7 @@ from vftcli.signals.remarks import Remark, fact
 from vftcli.signals.rest import faster, held
 
 PASSES = 3  #: Fits, each with the joints' residuals of the last one.
-SAME_MOTION = 5e-3  #: Largest position difference of two logs of one motion. [rad rms]
+SAME_MOTION = 5e-3  #: Largest difference of one motion's logs. [rad rms]
 COARSE, FINE = 0.05, 5e-4  #: Steps of the search for the shift between two logs. [s]
 DWELL = 0.5  #: Shortest rest that is a pose. [s]
 POSES = 4  #: Fewest different poses for mass and centre of mass.
@@ -50,7 +50,7 @@ LOOKED_AT = 400  #: Most samples of a motion among which poses are counted.
 #: Shortest motion: the masses of a UR10e and a UR3 scatter by .7 of their SD
 #: over 9 stretches of 10 s, by 1.6 over those of 5 s, by 2.4 of 2.5 s. [s]
 LONG = 10.0
-#: Weighings with the load on the arm: a third moves mass and centre by less than .1 %.
+#: Weighings with the load on the arm: a third moves it by less than .1 %.
 ROUNDS = 3
 
 
@@ -258,7 +258,7 @@ def payload_from_poses(recordings: Sequence[Recording], robot: Robot) -> LoadFit
     logs = np.split(np.arange(len(q)), np.cumsum(counts)[:-1])
     if len(logs) > 1:
         covariance += fit.cluster_covariance(logs)
-    else:  # links' errors pass for a load: usual ones, or as small as what is left shows
+    else:  # links' errors pass for a load: usual ones, or as what is left shows
         links = (fit.weights[..., None] * usual_errors(robot.chain, q)).reshape(extra.size, -1)
         by_links, rest, *_ = np.linalg.lstsq(fit.A.reshape(-1, STATIC), links)
         share = ((fit.left * fit.weights) ** 2).sum() / (rest.sum() or np.inf)

@@ -21,7 +21,7 @@ STRIBECK_VELOCITIES = (0.02, 0.05, 0.1, 0.2)
 LOGARITHMIC_VELOCITIES = (0.1, 0.2, 0.5, 1.0, 2.0)
 #: Speeds of the points of the friction line of UR's controllers. [rad/s]
 BENDS = (0.01, 0.5, 1.5, 3.2)
-#: Least share of the way between two points in a motion that shows the faster one.
+#: Least share of the way between two points that shows the faster one.
 SPANNED = 0.3
 #: Term → friction model in a robot file; the first that a joint has counts.
 MODELS = {
@@ -32,7 +32,7 @@ MODELS = {
     "offset": "coulomb-viscous-offset",
 }
 SIMPLEST = "coulomb-viscous"  #: Model of a joint without them.
-POINT = "point"  #: Head of a bent line's terms: point1 is the torque at its first speed.
+POINT = "point"  #: Head of a bent line's terms, as point1.
 
 
 class Shape(NamedTuple):
@@ -76,7 +76,7 @@ class Shape(NamedTuple):
         return text
 
     def friction(self, values: Array, confidence: str = "") -> JointFriction:
-        """The joint's friction with these coefficients, which others may follow. (k,)"""
+        """The joint's friction with these coefficients, the first ones. (k,)"""
         parameters = {k: round_digits(v) for k, v in zip(self.terms, values, strict=False)}
         torques = tuple(parameters.pop(term) for term in self.points)
         parameters["smoothing"] = self.smoothing
@@ -96,7 +96,7 @@ class Shape(NamedTuple):
 
 
 def bent(speed: float) -> Shape | None:
-    """The bent line for a motion up to a speed [rad/s], None of fewer than two points.
+    """The bent line up to a speed [rad/s], None of fewer than two points.
 
     Between its points the line is straight: a motion well beyond one shows the next one too;
     behind its last point it continues.

@@ -62,14 +62,14 @@ class PreparedLog:
 
     recording: Recording  #: The log.
     robot: Robot  #: The arm with its model.
-    cutoff: float  #: Cutoff of its filter, one for all parts of a joint's torque. [Hz]
+    cutoff: float  #: Cutoff of its filter. [Hz]
     kept: Indices  #: Numbers of these samples in the log. (M,)
     t: Array  #: Time. (M,) [s]
     q: Array  #: Positions. (M, n) [rad]
     dq: Array  #: Velocities. (M, n) [rad/s]
     ddq: Array  #: Accelerations. (M, n) [rad/s²]
     tau: Array  #: Drive torque, friction included. (M, n) [N·m]
-    #: Weight of every sample and joint, 0 in a long stop of the joint, in a gap of the clock, in
+    #: Weight of every sample and joint, 0 in the joint's long stops, in gaps of the clock, in
     #: a contact. (M, n)
     weights: Array
     #: Friction columns that were made for this robot. (M,) each
@@ -100,7 +100,7 @@ class PreparedLog:
 
     @cached_property
     def warmth(self) -> Array | None:
-        """Factor on each joint's friction by its temperature, None where unknown. (T, n)"""
+        """Factor on each joint's friction by temperature, or None. (T, n)"""
         temperature = measured_temperature(self.recording)
         return None if temperature is None else friction_factor(self.robot.friction, temperature)
 
@@ -115,7 +115,7 @@ class PreparedLog:
 
     @cached_property
     def predicted(self) -> Array:
-        """Drive torque by the robot's model, friction filtered like the log. (M, n) [N·m]"""
+        """Drive torque by the robot's model, filtered friction. (M, n) [N·m]"""
         robot, log = self.robot, self.recording
         torque = self.rigid + robot.chain.rotor_inertia * self.ddq
         if not robot.friction:
@@ -185,7 +185,7 @@ def usable_samples(t: Array, dq: Array, cutoff: float) -> Mask:
     usable = np.ones(dq.shape, bool)
     for j, moves in enumerate(faster(dq, NONZERO).T):
         usable[:, j] = ~covered(intervals(t, ~moves, least=STOP), len(t))
-    # The filter spreads a gap over half a period of its cutoff to either side.
+    # The filter spreads a gap by half a period of its cutoff.
     margin = 0.5 / cutoff
     for k in gaps_of(t, GAP):
         usable[(t > t[k] - margin) & (t < t[k + 1] + margin)] = False
@@ -210,7 +210,7 @@ class ParameterColumns(NamedTuple):
     """Order of all unknowns in a vector: inertial, rotor inertias, friction."""
 
     chain: Chain  #: The arm's geometry.
-    rotor: bool  #: Whether rotor inertias are unknown: with torque measured before the gear.
+    rotor: bool  #: Whether rotor inertias are unknown.
     shapes: tuple[Shape, ...]  #: Friction structure of each joint.
 
     @property

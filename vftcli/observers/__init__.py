@@ -79,7 +79,7 @@ class ObserverChoice(Choice):
             completes=names_at("observers.table:OBSERVERS"),
         ),
     ] = ()
-    #: Whether to leave out what could not run while the log is being written.
+    #: Whether to leave out what could not run online.
     causal: Annotated[bool, Option("--causal", "", "Use only what could run online.")] = False
     #: The user's parameters, which override every file's.
     settings: Annotated[
@@ -108,7 +108,7 @@ class ObserverChoice(Choice):
     as_printed: Annotated[
         bool, Option("--as-printed", "", "Use the paper's formulas as printed.")
     ] = False
-    #: Whether estimates start at the static residual of the first sample, not at zero.
+    #: Whether estimates start at the first sample's static residual.
     from_rest: bool = False
 
     def __post_init__(self) -> None:
@@ -144,7 +144,7 @@ class ObserverChoice(Choice):
 
     @property
     def from_spectra(self) -> bool:
-        """Whether an observer has gains from the spectra of the complete log."""
+        """Whether an observer has gains from the log's spectra."""
         from vftcli.observers.table import OBSERVERS
 
         return self.gains_of_log or any(OBSERVERS[name].from_spectra for name in self.names)
@@ -156,7 +156,7 @@ class ObserverChoice(Choice):
 
     @property
     def of_robot_file(self) -> bool:
-        """Whether all observers run with unchanged gains of the robot's file."""
+        """Whether all observers run with the robot file's gains."""
         return self.gains == PAPER_GAINS and not self.settings
 
     def beside_print(self) -> "ObserverChoice":

@@ -115,7 +115,7 @@ def discretise(scheme: str, convention: str, step: Array, d: Densities) -> Discr
 
 
 class Covariance(NamedTuple):
-    """Entries of a symmetric 2×2 covariance of [p; τ_ext], one a joint (and sample)."""
+    """Entries of a symmetric covariance of [p; τ_ext], as of `Gains`."""
 
     p11: Array
     p12: Array
@@ -185,7 +185,7 @@ def predict(P: Covariance, model: Discrete) -> Covariance:
 
 
 def update(prior: Covariance, r: Array) -> Gains:
-    """Gains for a measured momentum, and the covariance after it in Joseph's form."""
+    """Gains for a measured momentum, and the covariance after it."""
     S = prior.p11 + r
     l1, l2 = prior.p11 / S, prior.p12 / S
     # Joseph's form: an error of L₂ counts squared. R L₁ = (1 − L₁)P₁₁ in every digit.

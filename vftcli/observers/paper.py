@@ -75,7 +75,7 @@ class BlockObserver(Shown):
         return self.run(found)[0]
 
     def estimated(self, terms: DynamicsTerms, tau: Array, **more: Any) -> ExternalTorque:  # noqa: ANN401
-        """An estimate (T, n) [N·m] under the observer's name, its array handed over."""
+        """An estimate (T, n) [N·m] under the observer's name."""
         return ExternalTorque(name=self.name, t=terms.t, tau=handed_over(tau), **more)
 
 

@@ -47,7 +47,7 @@ from vftcli.signals.errors import ParameterError
 from vftcli.signals.filters import welch
 
 SEGMENT = 4.0  #: Length of a segment: slower changes are constant. [s]
-#: Fewest samples of a segment; a shorter free or loaded part has no spectrum.
+#: Fewest samples of a segment; a shorter part has no spectrum.
 LEAST_SEGMENT = 32
 IMPACT = 1.0  #: Longest contact of a loaded part of impacts. [s]
 #: Reach of the average over neighbouring frequencies, as a share of the frequency.
@@ -71,7 +71,7 @@ class Spectra:
     free: Array  #: S_n, over the free part. (F, n) [(N·m)²/Hz]
     loaded: Array  #: S_d, over the rest. (F, n) [(N·m)²/Hz]
     step: float  #: Sample time. [s]
-    segments: tuple[int, int]  #: Segments averaged over the free part and over the loaded one.
+    segments: tuple[int, int]  #: Segments of the free and the loaded part.
 
     def __post_init__(self) -> None:
         seal(self, "frequency", "free", "loaded")
@@ -201,7 +201,7 @@ class FreeError(NamedTuple):
 
     moving: Array  #: While the joint moves. (n,) [(N·m)²]
     resting: Array  #: While it rests. (n,) [(N·m)²]
-    unseen: Mask  #: Joints that hardly move there: `moving` rests on their dry friction. (n,)
+    unseen: Mask  #: Joints that hardly move there. (n,)
 
 
 def free_error(read: Array, resting: Mask, dry_friction: Array) -> FreeError:

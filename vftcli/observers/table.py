@@ -61,7 +61,7 @@ def parse_settings(assignments: Iterable[str]) -> Settings:
 
 
 def check_name(section: str, parameter: str, where: str = "") -> None:
-    """Raise a ParameterError that lists what there is unless the name exists."""
+    """Raise a ParameterError unless the name exists."""
     check_known(section, SECTIONS, f"{where}no observer {section!r} to set")
     complaint = f"{where}{section} has no parameter {parameter!r}"
     check_known(parameter, SECTIONS[section], complaint)
@@ -109,7 +109,7 @@ def load_gains(path: Path) -> Gains:
 
 
 def overlay_gains(under: Gains, over: Gains) -> Gains:
-    """Gains of one source, overridden parameter by parameter by another's."""
+    """Gains of one source, overridden by another's."""
     return {name: {**under.get(name, {}), **over.get(name, {})} for name in {**under, **over}}
 
 
@@ -157,10 +157,10 @@ class Entry(NamedTuple):
     section: str  #: The ``--set`` section of its parameters.
     equations: str  #: The paper's equations.
     summary: str  #: Its work in a sentence.
-    #: Builds it from a Setup and its name, with remarks on gains that nobody gave.
+    #: Builds it from a Setup and its name.
     build: Callable[[Setup, str], Built]
     from_spectra: bool = False  #: Whether its gains come from the log's spectra.
-    online: bool = True  #: Whether it could run while the log is being written.
+    online: bool = True  #: Whether it could run online.
 
 
 def build_first_order(setup: Setup, name: str) -> Built:

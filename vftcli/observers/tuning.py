@@ -50,7 +50,7 @@ KNOBS: dict[type, tuple[str, float, float]] = {
 
 
 def momentum(rate: Array) -> Observer:
-    """A momentum observer, equal in response to the filtered dynamics observer."""
+    """A momentum observer; the filtered dynamics observer responds alike."""
     return MomentumObserver(gain=rate)
 
 
@@ -228,7 +228,7 @@ def match_observers(
 
 
 def tune(observer: Observer, goal: Goal, step: float, joints: int) -> Observer:
-    """One observer with the gain that reaches a delay or bandwidth on every joint."""
+    """One observer with the gain that reaches a goal on every joint."""
     if type(observer) not in KNOBS:
         raise ParameterError(
             f"--gains cannot tune {observer.name}: it has no {goal.name} of its own to set; "
@@ -327,7 +327,7 @@ def tune_all(spectra: Spectra, goal: Goal) -> tuple[Tuned, ...]:
 
 
 def tuning_curves(spectra: Spectra) -> dict[str, Curve]:
-    """Observer → expected error over rate; both first-order ones share a curve."""
+    """Observer → expected error over rate."""
     kinds = {"fdo, gmo": momentum, **KALMAN}
     return {name: error_curve(kind, spectra) for name, kind in kinds.items()}
 
