@@ -10,11 +10,7 @@ import numpy as np
 
 from vftcli.bias import AUTOMATIC
 from vftcli.bias.baseline import Baseline, Baselines, FreeReading, free_reading
-from vftcli.bias.model_error import (
-    error_columns,
-    friction_alone,
-    smooth_motion,
-)
+from vftcli.bias.model_error import error_columns, friction_alone, smooth_motion
 from vftcli.bias.whole_log import fitted_times, stride_of
 from vftcli.free_motion.free_motion import SIGN_SPEED
 from vftcli.observers.observer import Observer

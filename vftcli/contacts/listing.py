@@ -36,11 +36,7 @@ from vftcli.contacts.rows import (
     shows_force,
 )
 from vftcli.contacts.search import Candidates, search
-from vftcli.contacts.windows import (
-    LEAST_EVIDENCE,
-    LEAST_IN_MOTION,
-    places,
-)
+from vftcli.contacts.windows import LEAST_EVIDENCE, LEAST_IN_MOTION, places
 from vftcli.free_motion.free_motion import FreeMotion
 from vftcli.robots.run import Run
 from vftcli.signals.arrays import Array, Mask, covered
@@ -50,13 +46,7 @@ from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Where, caution, on_joints
 from vftcli.signals.rest import MOVES, REST, faster
 from vftcli.wrench.model_error import error_process
-from vftcli.wrench.smoother import (
-    DRIVES,
-    BlockLog,
-    BlockSpan,
-    hidden_by_blocks,
-    smooth_wrench,
-)
+from vftcli.wrench.smoother import DRIVES, BlockLog, BlockSpan, hidden_by_blocks, smooth_wrench
 
 SHORTEST = 0.5  #: No contact is listed in a log shorter than this. [s]
 SLOWEST = 10.0  #: Rate below which a push of tenths of a second may go unseen. [Hz]

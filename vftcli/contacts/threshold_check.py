@@ -24,12 +24,7 @@ from vftcli.signals.arrays import Array
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.remarks import Remark, caution, fact
 from vftcli.signals.wrench import AXES, POINTS, Wrench
-from vftcli.wrench.detection import (
-    EARLY,
-    ContactInterval,
-    match_contacts,
-    true_contacts,
-)
+from vftcli.wrench.detection import EARLY, ContactInterval, match_contacts, true_contacts
 from vftcli.wrench.solvers import VirtualSensor
 
 GAIN = 10.0  #: Of the momentum observer. [1/s]
@@ -155,10 +150,7 @@ def check_contacts(
 
 
 def checked(
-    contact: ContactInterval,
-    t: Array,
-    size: Array,
-    alarms: Sequence[tuple[str, ContactInterval]],
+    contact: ContactInterval, t: Array, size: Array, alarms: Sequence[tuple[str, ContactInterval]]
 ) -> CheckedContact:
     """A contact with its peak force and the first alarm within it."""
     force = size[(t >= contact.start) & (t <= contact.stop)]

@@ -24,14 +24,7 @@ from vftcli.signals.arrays import Array, covered
 from vftcli.signals.estimation import SPIKE, LinearModel, log_likelihood, smoothed
 from vftcli.signals.pose import Pose
 from vftcli.wrench.model_error import UNKNOWN, ErrorProcess, error_model, innovations
-from vftcli.wrench.smoother import (
-    BlockLog,
-    BlockSpan,
-    JacobianIn,
-    Lane,
-    WrenchPrior,
-    assembled,
-)
+from vftcli.wrench.smoother import BlockLog, BlockSpan, JacobianIn, Lane, WrenchPrior, assembled
 
 ArmPart = Literal["wrist", "forearm", "upper arm", "cannot tell"]  #: A part of the arm.
 POINTS = 10  #: Points along each link that a force is tried at.

@@ -93,10 +93,7 @@ class FreeChoice(Choice):
     low_pass: Annotated[
         float | str | None,
         Option(
-            "two-cycle.low-pass",
-            "auto|none|HZ",
-            "Zero-phase low-pass of the difference.",
-            cutoff,
+            "two-cycle.low-pass", "auto|none|HZ", "Zero-phase low-pass of the difference.", cutoff
         ),
     ] = AUTOMATIC
 

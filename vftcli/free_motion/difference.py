@@ -14,14 +14,7 @@ import numpy as np
 from vftcli.robots.friction import REPEATED_STOP, TWO_STOPS
 from vftcli.robots.run import Run, signal_edge
 from vftcli.robots.terms import GAP
-from vftcli.signals.arrays import (
-    Array,
-    Mask,
-    around,
-    empty_series,
-    gaps_of,
-    resample_columns,
-)
+from vftcli.signals.arrays import Array, Mask, around, empty_series, gaps_of, resample_columns
 from vftcli.signals.errors import ReferenceTorqueError
 from vftcli.signals.filters import band_pass, low_pass, noise_passed
 from vftcli.signals.remarks import Remark, fact
