@@ -9,7 +9,7 @@ import pytest
 from vftcli.readers.reader import ReadChoice
 from vftcli.readers.reading import Library
 from vftcli.signals.recording import Recording
-from vftcli.signals.repairs import is_fast, with_velocity, without_isolated
+from vftcli.signals.repairs import RATE, with_velocity, without_isolated
 
 
 def swinging(rate: float, seconds: float = 8.0) -> tuple[Recording, np.ndarray]:
@@ -50,7 +50,7 @@ def test_a_joint_that_is_logged_within_a_turn_has_no_jumps_in_its_velocity() -> 
 @pytest.mark.parametrize(("rate", "fast"), [(1000.0, True), (50.0, True), (49.0, False)])
 def test_from_50_hz_on_it_is_done_unasked_and_what_a_log_has_is_kept(rate, fast) -> None:
     log, truth = swinging(rate)
-    assert is_fast(log) is fast
+    assert (with_velocity(log, RATE) is not log) is fast
     log = replace(log, dq=truth)
     assert with_velocity(log) is log
 

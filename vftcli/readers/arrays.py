@@ -46,7 +46,15 @@ def read(file: LogFile, request: ReadChoice, layout: LogFormat) -> RawLog:
     if layout.name == "ur-binary":
         return from_table(binary_table(file), request, UR)
     if layout.name == "npz":
-        return _read_arrays(file, _npz_arrays(file), request)
+        what = "damaged, or no arrays of numbers"
+        with (
+            naming_damage(file.path, what, zipfile.BadZipFile, remedy=RESAVE),
+            np.load(BytesIO(file.content), allow_pickle=False) as bundle,
+        ):
+            total = sum(member.file_size for member in bundle.zip.infolist())
+            check_unpacked(file.path, total, len(file.content))
+            each = {name: bundle[name] for name in bundle.files}
+        return _read_arrays(file, each, request)
     if layout.name == "npy":
         stream = BytesIO(file.content)
         with naming_damage(
@@ -123,7 +131,6 @@ def _read_arrays(file: LogFile, log: Data, request: ReadChoice, remarks: Notes =
 
 
 def _arrays_of(file: LogFile, log: Mapping[Any, Any]) -> Columns:
-    """The number arrays of a log with a row or more."""
     arrays = {}
     for name, value in log.items():
         if not isinstance(value, np.ndarray | list):
@@ -139,19 +146,6 @@ def _arrays_of(file: LogFile, log: Mapping[Any, Any]) -> Columns:
     if not arrays:
         raise NoLogError(f"{file.path}: holds no arrays of numbers, so no log.")
     return arrays
-
-
-def _npz_arrays(file: LogFile) -> Columns:
-    with (
-        naming_damage(
-            file.path, "damaged, or no arrays of numbers", zipfile.BadZipFile, remedy=RESAVE
-        ),
-        np.load(BytesIO(file.content), allow_pickle=False) as bundle,
-    ):
-        total = sum(member.file_size for member in bundle.zip.infolist())
-        check_unpacked(file.path, total, len(file.content))
-        each = ((name, bundle[name]) for name in bundle.files)
-        return {name: array for name, array in each if isinstance(array, np.ndarray)}
 
 
 #: Type words of the second line of a binary file by UR's official client.
@@ -224,7 +218,6 @@ def _is_clock(name: str) -> bool:
 
 
 def _matlab_73(file: LogFile) -> Columns:
-    """The variables of numbers of a file of version 7.3."""
     with opened(file) as content:
         table = table_of(file.path, content, fewest_rows=1)
         names = {
@@ -260,7 +253,6 @@ def _matlab_5(file: LogFile) -> Columns:
 
 
 def _check_matlab(file: LogFile) -> None:
-    """Check what the packed variables of a file unpack to."""
     content, place, total = file.content, HEADER, 0
     limit = unpacked_limit(len(content))
     order: Literal["little", "big"] = "little" if bytes(content[126:128]) == b"IM" else "big"

@@ -127,7 +127,6 @@ class TextTable(Table):
         return tuple(words)
 
     def _parsed(self, kinds: Mapping[int, str]) -> Iterator[dict[int, Arrow]]:
-        """The columns of each piece of the text, by their types."""
         for text in self._pieces():
             # Most texts parse as they are; mending copies them, so it waits for a
             # failure, but for doubled blanks, between which cells are seen.
@@ -206,7 +205,6 @@ class TextTable(Table):
         return b"\n".join(row + between * (count - row.count(between)) for row in rows if row)
 
     def _start(self) -> int:
-        """Where the first row begins."""
         pattern = rb"(\xef\xbb\xbf)?([ \t]*(#[^\r\n]*)?[\r\n]+)*"
         pattern += rb"[^\r\n]*[\r\n]*" if self.is_headed else b""
         match = re.match(pattern, self.file.content)

@@ -1,7 +1,4 @@
-"""HDF5 logs, read within bounds by h5py: ALOHA's, DROID's, or any by its paths.
-
-DROID's raw release is a folder of episodes, each a trajectory.h5 beside its metadata.
-"""
+"""HDF5 logs, read within bounds by h5py: ALOHA's, DROID's, or any by its paths."""
 
 import itertools
 import math

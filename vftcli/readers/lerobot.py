@@ -122,7 +122,6 @@ def _columns_of(
 
 
 def _in_order(path: Path, signal: str, elements: list[Element], names: Names) -> list[Element]:
-    """A signal's elements in the order of the joints; as given without names."""
     by_joint = {element.joint: element for element in elements}
     if not names or "" in by_joint:
         return elements

@@ -1,7 +1,4 @@
-"""Objects of JSON, parsed within bounds, and of pickles, which are never executed.
-
-A pickle is opened only if it rebuilds nothing but NumPy arrays.
-"""
+"""Objects of JSON, parsed within bounds, and of pickles, which are never executed."""
 
 import io
 import json

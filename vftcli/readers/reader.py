@@ -148,16 +148,14 @@ class ReadChoice(Choice):
 
     def with_stated_effort(self, recording: "Recording") -> "Recording":
         """A recording with its effort as stated, and derived velocities."""
-        from vftcli.signals.repairs import is_fast, with_velocity
+        from vftcli.signals.repairs import RATE, with_velocity
 
         kind = EFFORT[self.effort] if self.effort is not None else None
         if kind is not None:
             recording = recording.with_effort(kind)
         if self.derive == "dq":
-            recording = with_velocity(replace(recording, dq=None))
-        elif self.derive is None and is_fast(recording):
-            recording = with_velocity(recording)
-        return recording
+            return with_velocity(replace(recording, dq=None))
+        return recording if self.derive else with_velocity(recording, RATE)
 
     def within(self, recording: "Recording") -> "Recording":
         """The part of a recording in the interval, which may not be empty."""

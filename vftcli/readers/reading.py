@@ -1,7 +1,4 @@
-"""Reading: a file, bag or dataset becomes a Recording, by content, not by name.
-
-A command's `Library` reads each log once and names it by its own label.
-"""
+"""Reading: a file, bag or dataset becomes a Recording, by content, not by name."""
 
 import os
 import re
@@ -206,7 +203,20 @@ def _reader(file: LogFile, choice: ReadChoice) -> LogFormat:
         raise UnknownFormatError(
             f"no format {name!r}; known formats: {', '.join(FORMATS)}.{did_you_mean(name, FORMATS)}"
         )
-    reader = FORMATS[name] if name else _recognised(file)
+    # A general format fits nearly any text, so it comes last.
+    found = [FORMATS[name]] if name else []
+    for general in (False, True):
+        if not found and not (general and known_kind(file)):
+            each = (r for r in FORMATS.values() if r.general is general)
+            found = [r for r in each if r.recognises(file)]
+    if not found:
+        raise UnknownFormatError(f"{file.path}: not recognised as a log: {description(file)}.")
+    if len(found) > 1:
+        names = " or ".join(reader.name for reader in found)
+        raise UnknownFormatError(
+            f"{file.path}: could be {names}. Say which: --set log.format=NAME."
+        )
+    reader = found[0]
     if choice.columns is None:
         return reader
     if not reader.takes_columns:
@@ -216,21 +226,6 @@ def _reader(file: LogFile, choice: ReadChoice) -> LogFormat:
         )
     whole = reader.general or reader.describes or not file.lines
     return reader if whole else FORMATS["table"]
-
-
-def _recognised(file: LogFile) -> LogFormat:
-    # A general format fits nearly any text, so it comes last.
-    found = [r for r in FORMATS.values() if not r.general and r.recognises(file)]
-    if not found and known_kind(file) is None:
-        found = [r for r in FORMATS.values() if r.general and r.recognises(file)]
-    if not found:
-        raise UnknownFormatError(f"{file.path}: not recognised as a log: {description(file)}.")
-    if len(found) > 1:
-        names = " or ".join(reader.name for reader in found)
-        raise UnknownFormatError(
-            f"{file.path}: could be {names}. Say which: --set log.format=NAME."
-        )
-    return found[0]
 
 
 def description(file: LogFile) -> str:

@@ -57,7 +57,16 @@ def read_reference(path: Path, columns: str | None = None) -> RawLog:
     (T, n) [N·m], `wrench` (T, 6) [N, N·m], or both, on the robot.
     """
     table = table_at(path)
-    picks = _stated(table, columns) if columns else _found(table)
+    if not columns:
+        picks = _found(table)
+    else:
+        picks = picks_of(table, parse_columns(columns, log=False))
+        if picks.keys().isdisjoint({TORQUE, "wrench"}):
+            raise LogError(
+                f"{path}: --reference-columns names no tau_ext or wrench, as in t,tau_ext:6."
+            )
+        if (wrench := picks.get("wrench")) and len(wrench.cells) != 6:
+            raise LogError(f"{path}: a wrench has 6 columns, not {len(wrench.cells)}.")
     raw = load_signals(table, picks, ReadChoice(signals=frozenset({TORQUE, "wrench"})))
     raw = replace(raw, stamps=program_clock(raw, path), tick=1.0)
     for name, values in raw.signals.items():
@@ -110,17 +119,6 @@ def read_list(path: Path) -> list[tuple[float, float, float, float, bool]]:
         ]
     except (OSError, KeyError, TypeError, ValueError, pl.exceptions.PolarsError):
         raise LogError(f"{path}: a list has columns start_s, stop_s, peak_force_N") from None
-
-
-def _stated(table: Table, columns: str) -> Picks:
-    picks = picks_of(table, parse_columns(columns, log=False))
-    if picks.keys().isdisjoint({TORQUE, "wrench"}):
-        raise LogError(
-            f"{table.path}: --reference-columns names no tau_ext or wrench, as in t,tau_ext:6."
-        )
-    if (wrench := picks.get("wrench")) and len(wrench.cells) != 6:
-        raise LogError(f"{table.path}: a wrench has 6 columns, not {len(wrench.cells)}.")
-    return picks
 
 
 def _found(table: Table) -> Picks:

@@ -140,7 +140,19 @@ class RobotChoice(Choice):
             )
         robot = load_robot(name, tip=self.tip)
         if self.payload == DECLARED:
-            robot = robot.with_payload(declared_payload(recording))
+            import numpy as np
+
+            from vftcli.robots.chain import Payload
+
+            if recording.payload_mass is None:
+                raise RobotError(
+                    f"{recording.name}: the log does not say which payload was set at the "
+                    "controller; describe it in a [payload.NAME] section of the robot file and "
+                    "give --payload NAME"
+                )
+            # The controller never knows an inertia.
+            com = np.array(recording.payload_com or (0.0, 0.0, 0.0))
+            robot = robot.with_payload(Payload(mass=recording.payload_mass, com=com))
         elif self.payload is not None:
             robot = robot.with_payload(self.payload)
         if self.friction == "model":
@@ -166,22 +178,6 @@ def choices_for(recording: "Recording") -> str:
         f"choose one with --robot: {', '.join(fitting)}, or a FILE.toml or "
         f"FILE.urdf of {recording.joints} joints"
     )
-
-
-def declared_payload(recording: "Recording") -> "Payload":
-    """The payload known to the controller; it never has an inertia."""
-    import numpy as np
-
-    from vftcli.robots.chain import Payload
-
-    mass, com = recording.payload_mass, recording.payload_com
-    if mass is None:
-        raise RobotError(
-            f"{recording.name}: the log does not say which payload was set at the controller; "
-            "describe it in a [payload.NAME] section of the robot file and give --payload NAME"
-        )
-    centre = np.zeros(3) if com is None else np.asarray(com, float)
-    return Payload(mass=mass, com=centre)
 
 
 __all__ = [

@@ -26,7 +26,7 @@ TURNING = ("revolute", "continuous")  #: Kinds of joints that an arm is made of.
 class TreeJoint:
     """A joint between two links."""
 
-    name: str  #: Its name.
+    name: str
     #: revolute, continuous, prismatic, fixed, or one that cannot move an arm.
     kind: str
     parent: str  #: The link that carries it.
@@ -67,9 +67,9 @@ class BodyTree:
     """Links and joints of a description."""
 
     name: str  #: The robot's name.
-    path: Path  #: The file.
+    path: Path
     bodies: Mapping[str, Body]  #: Each link's inertia, `NO_BODY` where it gives none.
-    joints: Sequence[TreeJoint]  #: The joints.
+    joints: Sequence[TreeJoint]
     gravity: Array  #: Gravity in the root's axes. (3,) [m/s²]
 
     def __post_init__(self) -> None:
@@ -165,7 +165,7 @@ BASE = -1  #: The group of the links that do not move.
 class LumpedArm:
     """An arm of a tree with everything else locked."""
 
-    tree: BodyTree  #: The tree.
+    tree: BodyTree
     tip: str = ""  #: The link or joint that the arm ends at, "" for the longest arm.
     #: Position of each joint that is held whatever it is, by name. [rad or m]
     angles: Mapping[str, float] = field(default_factory=dict)

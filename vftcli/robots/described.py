@@ -4,8 +4,7 @@ The TOML says what these cannot: it has the description's name, `tip` and `lock`
 arm and the held rest, and ``[[joints]]`` that match by name.
 
 A xacro is a program that writes a URDF. The package xacro expands it without ROS, in a
-process of its own, since a program need not end. Packages of $(find NAME) are looked for
-beside the file and above it, by their `package.xml`.
+process of its own, since a program need not end.
 """
 
 import json
@@ -116,7 +115,15 @@ def robot_of(lumped: LumpedArm, file: Section) -> Robot:
     chain = lumped.chain
     if why := weightless(chain.mass.sum()):
         raise RobotError(f"{lumped.tree.path}: {why}, or take the maker's dynamic description")
-    joints = matched_joints(file, chain, lumped.tree)
+    tables = {str(table.get("name")): (j, table) for j, table in enumerate(file.tables("joints"))}
+    known = {joint.name for joint in lumped.tree.joints}
+    if unknown := [name for name in tables if name not in known]:
+        raise RobotError(
+            f"{file.file.path}: no joint {unknown[0]!r} in {lumped.tree.path.name}; "
+            f"it has {', '.join(chain.names)}"
+        )
+    each = (tables.get(name, (None, {"name": name})) for name in chain.names)
+    joints = [Section(file.file, table, "joints", j) for j, table in each]
     rotor = column(joints, "rotor_inertia")
     rotor = np.where(np.isnan(rotor), chain.rotor_inertia, rotor)
     gravity = file.vector("gravity", 3, chain.gravity.tolist())
@@ -137,21 +144,6 @@ def locked_angles(file: Section, tree: BodyTree) -> dict[str, float]:
             meant = did_you_mean(name, names)
             file.refuse(f"lock: no joint {name!r}.{meant} There is {shortened(names)}", "lock")
     return {name: table.number(name) for name in table.values}
-
-
-def matched_joints(file: Section, chain: Chain, tree: BodyTree) -> list[Section]:
-    """The ``[[joints]]`` of the TOML in the chain's order."""
-    tables = {str(table.get("name")): (j, table) for j, table in enumerate(file.tables("joints"))}
-    known = {joint.name for joint in tree.joints}
-    if unknown := [name for name in tables if name not in known]:
-        raise RobotError(
-            f"{file.file.path}: no joint {unknown[0]!r} in {tree.path.name}; "
-            f"it has {', '.join(chain.names)}"
-        )
-    return [
-        Section(file.file, table, "joints", j)
-        for j, table in (tables.get(name, (None, {"name": name})) for name in chain.names)
-    ]
 
 
 def arm_remarks(lumped: LumpedArm, chain: Chain) -> Iterator[Remark]:

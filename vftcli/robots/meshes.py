@@ -1,8 +1,4 @@
-"""Mesh files of a URDF: found near it, placed on its arm's links, and read.
-
-Packages that it names are looked for above the file and beside the folders there, by
-their `package.xml`, else by the name of a folder above it.
-"""
+"""Mesh files of a URDF: found near it, placed on its arm's links, and read."""
 
 import re
 from collections.abc import Iterator, Mapping
@@ -48,6 +44,7 @@ def meshes_of(arm: LumpedArm, root: ET.Element) -> tuple[Mesh, ...]:
     `root` is the first element of the URDF.
     """
     asked = any("package://" in mesh.get("filename", "") for mesh in root.iter("mesh"))
+    # A package's name is in its `package.xml`, else its folder's.
     above = reversed(arm.tree.path.resolve().parents[:ABOVE])
     packages = {folder.name: str(folder) for folder in above}
     packages |= packages_near(arm.tree.path) if asked else ()

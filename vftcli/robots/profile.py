@@ -51,8 +51,17 @@ def load_profile(path: Path) -> Robot:
     """Read a robot file."""
     root = RobotFile(path).root
     check_count(root, "schema", SCHEMA, f"; this version reads schema {SCHEMA}")
-    joints = joint_sections(root)
-    return assemble(root, joints, build_chain(root, joints))
+    tables = root.tables("joints")
+    if not tables:
+        root.refuse("there are no [[joints]] tables; a robot file has one for each joint")
+    count = len(tables)
+    check_count(root, "dof", count, f" but the file has {count} [[joints]] tables")
+    joints = [Section(root.file, table, "joints", j) for j, table in enumerate(tables)]
+    names = [joint.text("name", f"joint{i}") for i, joint in enumerate(joints, start=1)]
+    for j, (joint, name) in enumerate(zip(joints, names, strict=True)):
+        if name in names[:j]:
+            joint.refuse(f"name is {name!r}, as another joint's; each has its own", "name")
+    return assemble(root, joints, build_chain(root, joints, names))
 
 
 def assemble(root: Section, joints: Sequence[Section], chain: Chain) -> Robot:
@@ -111,27 +120,7 @@ def check_count(root: Section, key: str, count: int, message: str) -> None:
         root.refuse(f"{key} is {shown(stated)}{message}", key)
 
 
-def joint_sections(root: Section) -> list[Section]:
-    """The ``[[joints]]`` tables, as many as `dof`, each with its own name."""
-    tables = root.tables("joints")
-    if not tables:
-        root.refuse("there are no [[joints]] tables; a robot file has one for each joint")
-    count = len(tables)
-    check_count(root, "dof", count, f" but the file has {count} [[joints]] tables")
-    joints = [Section(root.file, table, "joints", j) for j, table in enumerate(tables)]
-    names = joint_names(joints)
-    for j, (joint, name) in enumerate(zip(joints, names, strict=True)):
-        if name in names[:j]:
-            joint.refuse(f"name is {name!r}, as another joint's; each has its own", "name")
-    return joints
-
-
-def joint_names(joints: Sequence[Section]) -> tuple[str, ...]:
-    """The names of the joints, joint1, joint2, … where the file gives none."""
-    return tuple(joint.text("name", f"joint{i}") for i, joint in enumerate(joints, start=1))
-
-
-def build_chain(root: Section, joints: Sequence[Section]) -> Chain:
+def build_chain(root: Section, joints: Sequence[Section], names: Sequence[str]) -> Chain:
     """The chain that a file's convention, frames and bodies state."""
     convention = root.choice("convention", CONVENTIONS)
     numbers, vectors = CONVENTIONS[convention]
@@ -150,7 +139,6 @@ def build_chain(root: Section, joints: Sequence[Section]) -> Chain:
     if why := weightless(sum(body.mass for body in bodies)):
         root.refuse(why)
     rotors, gravity = column(joints, "rotor_inertia", 0.0), root.vector("gravity", 3, UPRIGHT)
-    names = joint_names(joints)
     return Chain.of(names, placements, bodies, rotor_inertia=rotors, gravity=gravity)
 
 

@@ -1,7 +1,5 @@
 """The text of a robot file and its tables: read, bounds checked, written.
 
-Every complaint names the line that is wrong.
-
 Numbers beyond the bounds are slips, or in another unit: the bounds are an order of
 magnitude or more beyond the largest arm built (2.3 t payload, 12 t of its own, 4.7 m
 reach) and beyond any motion of an arm. A file inside them may still be wrong, but its
@@ -214,7 +212,7 @@ class RobotFile:
 class Section(NamedTuple):
     """A table of a robot file; values are checked as they are read."""
 
-    file: RobotFile  #: The file.
+    file: RobotFile
     values: Mapping[str, Any]  #: The table.
     table: str = ""  #: Its dotted name, "" for the whole document.
     #: Which ``[[joints]]`` it is or belongs to, from 0, or None outside of them.

@@ -42,7 +42,7 @@ class Run(Shown):
     Less an error of its model it is a run again.
     """
 
-    recording: Recording  #: The recording.
+    recording: Recording
     robot: Robot  #: The arm, its payload mounted.
     #: Whether `terms` come from the paper's numeric method; equal to a millionth.
     literal: bool = False
@@ -195,7 +195,7 @@ def block_means(x: Array, count: int) -> Array:
 class RunSamples(NamedTuple):
     """Some samples of a run."""
 
-    run: Run  #: The run.
+    run: Run
     inside: Mask  #: Which of its samples they are. (T,)
 
     @property

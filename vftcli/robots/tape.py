@@ -136,7 +136,6 @@ class Program:
     """
 
     def __init__(self, tape: Tape, outputs: Sequence[Value]) -> None:
-        """Plan the operations."""
         rows = []
         for sign, row in outputs:
             if row is None or (sign > 0.0 and row >= tape.inputs and row not in rows):

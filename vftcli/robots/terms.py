@@ -1,7 +1,4 @@
-"""Dynamics terms p and μ of a log, the input of observers; raw disturbance.
-
-The raw disturbance is the external torque by p and μ, unfiltered, with all their noise.
-"""
+"""Dynamics terms p and μ of a log, the input of observers; raw disturbance."""
 
 from collections.abc import Iterable
 from typing import Any, NamedTuple

@@ -1,7 +1,4 @@
-"""URDF and MJCF as trees of links and joints, every number checked.
-
-A URDF may come out of a xacro. An MJCF, MuJoCo's description, is read by Pinocchio.
-"""
+"""URDF and MJCF (by Pinocchio) as trees of links and joints, every number checked."""
 
 import math
 import os
@@ -63,7 +60,7 @@ def urdf_tree(path: Path, root: ET.Element) -> BodyTree:
 class UrdfPart(NamedTuple):
     """A link or a joint of a URDF, read number by number."""
 
-    path: Path  #: The file.
+    path: Path
     element: ET.Element  #: The link or the joint.
 
     @property

@@ -1,7 +1,6 @@
 """Errors a user can cause and can mend.
 
-Every message is one line: what is wrong, what there is, what to do. The command line
-prints it and exits with code 1; nothing else in the package prints or exits.
+Every message is one line: what is wrong, what there is, what to do.
 """
 
 from typing import Any

@@ -1,7 +1,5 @@
 """Estimation: least squares; Kalman filter and smoother of a linear model.
 
-Least squares: normal equations, Huber weights, spreads, cross-validation.
-
 In a linear model, states x of a size N move from block to block each on its own, and n
 numbers d show them:
 
@@ -31,9 +29,8 @@ HUBER = 2.5
 PASSES = 6  #: Reweighting passes.
 #: Eigenvalues below this share of the largest tell nothing.
 NULL = 1e-12
-NULL_OF_INVERSE = (
-    1e-10  #: `NULL` of an inverse, in which a single such value outweighs all others.
-)
+#: `NULL` of an inverse, in which a single such value outweighs all others.
+NULL_OF_INVERSE = 1e-10
 SD_PER_MEDIAN = 1.4826  #: SD of normal noise over the median of its size.
 FOLDS = 5  #: Contiguous stretches of the log for cross-validation.
 

@@ -172,24 +172,21 @@ class Choice:
         return found is not None and found[2].is_setting and name != NUMBERS
 
     @classmethod
-    def words_of(cls, settings: Mapping[str, str]) -> dict[str, Any]:
-        """The words that settings state, by name; those of other choices are left out."""
-        own = {name: text for name, text in settings.items() if cls.takes(name)}
-        words = {name: own.pop(name) for name in cls.options() if name in own}
-        return words | (
-            {NUMBERS: [f"{name}={text}" for name, text in own.items()]} if own else {}
-        )
-
-    @classmethod
     def parsed(
         cls,
         *,
         settings: Mapping[str, str] = MappingProxyType({}),
         **words: Any,  # noqa: ANN401 - texts, numbers, lists of them
     ) -> Self:
-        """The choice that words and settings state; None and [] state nothing."""
+        """The choice that words and settings state; None and [] state nothing.
+
+        Settings of other choices are left out.
+        """
         options, values = cls.options(), {}
-        words |= cls.words_of(settings)
+        own = {name: text for name, text in settings.items() if cls.takes(name)}
+        words |= {name: own.pop(name) for name in options if name in own}
+        if own:
+            words[NUMBERS] = [f"{name}={text}" for name, text in own.items()]
         for word, typed in words.items():
             field, what, option = options[word]
             if typed is not None and (typed or not option.several):

@@ -1,7 +1,4 @@
-"""Packages: our version; optional ones, loaded when needed. An error names a missing one.
-
-Estimation, errors, contacts and pages need none of them.
-"""
+"""Packages: our version; optional ones, loaded when needed. An error names a missing one."""
 
 import sys
 from collections.abc import Callable

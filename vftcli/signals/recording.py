@@ -69,9 +69,8 @@ class Awaited:
 class Source(Shown):
     """Where a recording came from and what was done to it on the way in."""
 
-    path: Path | None = (
-        None  #: The file or bag directory, or None for a recording made in memory.
-    )
+    #: The file or bag directory, or None for a recording made in memory.
+    path: Path | None = None
     #: Its name in tables, unique within a command.
     label: str = ""
     format: str = "memory"  #: The reader's name.
@@ -80,9 +79,8 @@ class Source(Shown):
     sha256: Awaited = Awaited()
     clock: str = "as given"  #: Which clock the stamps are from, in words.
     t0: float = 0.0  #: The log's own stamp of the first sample. [s]
-    t0_ns: int | None = (
-        None  #: The same stamp in whole nanoseconds where the log counts them. [ns]
-    )
+    #: The same stamp in whole nanoseconds where the log counts them. [ns]
+    t0_ns: int | None = None
     rows: int = 0  #: Samples the file held before any were dropped.
     duplicates: int = 0  #: Rows dropped because their stamp repeated the one before.
     #: Signals that were made of others here and stand in no log.

@@ -62,7 +62,6 @@ class Remark(Shown):
         object.__setattr__(self, "values", MappingProxyType(plain))
 
     def __str__(self) -> str:
-        """The remark on one line."""
         return sentence(self)
 
     def _headline(self) -> str:

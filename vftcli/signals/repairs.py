@@ -31,12 +31,15 @@ ONE_TURN = 2 * np.pi + 0.1
 RATE = 50.0  #: Rate from which velocities are derived without being asked for. [Hz]
 
 
-def with_velocity(recording: Recording) -> Recording:
+def with_velocity(recording: Recording, slowest: float = 0.0) -> Recording:
     """A log with velocities derived from its positions, if it has none.
 
-    dq = the gradient of q on the log's own stamps, low-passed without phase shift.
+    dq = the gradient of q on the log's own stamps, low-passed without phase shift; none
+    of a log below the rate `slowest` [Hz].
     """
     if recording.dq is not None or recording.samples < 3:
+        return recording
+    if recording.median_step * slowest > 1.001:
         return recording
     cutoff = min(CUTOFF, OF_NYQUIST * 0.5 / recording.median_step)
     # Endless joints logged within one turn jump; a motor's count does not.
@@ -46,11 +49,6 @@ def with_velocity(recording: Recording) -> Recording:
     said = caution("derived-velocity", cutoff_Hz=cutoff, blunted_ms=1e3 * BLUNTED / cutoff)
     changed = recording.changed(said, dq=low_pass(recording.t, slopes, cutoff))
     return replace(changed, source=replace(changed.source, derived=("dq",)))
-
-
-def is_fast(recording: Recording) -> bool:
-    """Whether a log's rate lets its velocities be derived unasked."""
-    return recording.samples >= 3 and recording.median_step * RATE <= 1.001
 
 
 #: A sample is compared with so many before it and so many behind it, by their median.
@@ -71,9 +69,8 @@ END = 4.0
 #: An effort is no further off than so many times what its three closest neighbours in
 #: size differ by: a tap of three samples is a tap. Two samples of one stand alone.
 PEAK = 2.0
-FINEST = (
-    1e-6  #: And efforts off by less: a log in single precision keeps 1e-5 of 100 N·m. [A, N·m]
-)
+#: And efforts off by less: a log in single precision keeps 1e-5 of 100 N·m. [A, N·m]
+FINEST = 1e-6
 
 
 def without_isolated(recording: Recording) -> Recording:

@@ -14,13 +14,11 @@ COMMANDED = 2e-3
 #: Below it stiction holds the joint: above noise, up to an encoder's steps over 24 ms. [rad/s]
 REST = 0.01
 MOVES = 0.02  #: Above it, twice that, no noise is motion: friction is that of motion. [rad/s]
-SLIDES = (
-    0.05  #: Below it a joint of filtered speed may stick, above it its friction shows. [rad/s]
-)
+#: Below it a joint of filtered speed may stick, above it its friction shows. [rad/s]
+SLIDES = 0.05
 HELD, WINDOW = 1e-3, 0.2  #: Way up to which a joint is held [rad], and within how long. [s]
-LEAST = (
-    0.25  #: Shorter stops are reversals, which the friction model's account of them covers. [s]
-)
+#: Shorter stops are reversals, which the friction model's account of them covers. [s]
+LEAST = 0.25
 BREAKAWAY = 0.1  #: Time around a stop in which the joint settles or breaks away. [s]
 AROUND = 0.15  #: Time before and after a sample that says whether the joint rests in it. [s]
 NEAR_REST = 0.3  #: Stiction counts this long around a rest too, where no free part tells. [s]

@@ -73,7 +73,6 @@ class WrenchFrame:
         return -1.0 if self.sign == "by-robot" else 1.0
 
     def __str__(self) -> str:
-        """The frame in words."""
         point = POINTS.get(self.point, self.point)
         sense = "BY the robot ON the environment" if self.sign == "by-robot" else "on the robot"
         return f"{self.axes} axes at {point}, as force {sense}"

@@ -181,7 +181,7 @@ class Arm:
             if (factor := friction_factor(self.robot.friction, temperature)) is not None:
                 plant.true_friction = self.true.friction.times(factor[0], factor[0])
         # Contacts cost Jacobians; most steps have none.
-        if self.touching.anything(t):
+        if any(m.contact.index_at(t) is not None for m in self.touching.mounted):
             plant.advance(tau, lambda m, data, v: self.touching.torque(t, m, data, v))
             self.wrenches[k] = self.touching.wrenches
         else:

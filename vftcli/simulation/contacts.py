@@ -228,10 +228,6 @@ class Touching:
             self.mounted.append(Mounted(spec.name, contact, joint, turn, point, lever))
         self.wrenches = np.zeros((len(self.mounted), 6))
 
-    def anything(self, t: float) -> bool:
-        """Whether any contact may exert something at `t` [s]."""
-        return any(m.contact.index_at(t) is not None for m in self.mounted)
-
     def torque(self, t: float, model: Any, data: Any, v: Array) -> Array:  # noqa: ANN401
         """Joint torque of all contacts; the data's joint Jacobians are current. (n,) [N·m]"""
         import pinocchio as pin

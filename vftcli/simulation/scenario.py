@@ -123,9 +123,8 @@ class SensingSpec(Spec):
 
     rate: float = 0.0  #: Samples per second; 0 takes the vendor's own. [Hz]
     torque: str = "average"  #: "average" over the sampling interval, or "instant".
-    noise: float = (
-        1.0  #: Factor on the profile's noise of position, velocity, current and torque.
-    )
+    #: Factor on the profile's noise of position, velocity, current and torque.
+    noise: float = 1.0
     #: SD of the current in place of the profile's. [A]
     current_noise: float | None = None
     position_step: float = 5e-6  #: Quantisation of positions. [rad]

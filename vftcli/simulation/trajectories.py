@@ -127,9 +127,8 @@ class CircleSpec(Spec, kind="circle"):
     radius: float = 0.2  #: Radius. [m]
     period: float = 4.0  #: Time of one round. [s]
     cycles: float = 5.0  #: Rounds.
-    towards: float = (
-        0.0  #: Direction from the start to the centre, from base x about base z. [rad]
-    )
+    #: Direction from the start to the centre, from base x about base z. [rad]
+    towards: float = 0.0
 
     def motion(self, robot: Robot) -> Command:
         """The circle as a Fourier series of the joints."""
