@@ -58,9 +58,9 @@ def test_every_contact_is_detected_or_missed_with_its_delay_and_force():
     assert [c.by for c in check.contacts] == ["J2", "", "J2"]
     # Half a sample for the rounding of edges.
     assert [c.delay for c in check.detected] == pytest.approx([LAG, LAG], abs=0.006)
-    assert (check.smallest_detected, check.largest_missed) == (25.0, 10.0)
-    assert check.median_delay == pytest.approx(LAG, abs=0.006)
-    assert check.longest_delay == pytest.approx(LAG, abs=0.006)
+    *delays, weakest, missed = check.figures.values()
+    assert (weakest, missed) == (25.0, 10.0)
+    assert delays == pytest.approx([LAG, LAG], abs=0.006)
     assert check.false_alarms == 0
     # 18 s after the settling, 3 of them touched, each a sample longer or shorter.
     assert 3600.0 * check.untouched_h == pytest.approx(15.0, abs=0.07)
@@ -81,14 +81,15 @@ def test_who_tells_a_contact_and_what_is_false(extra, torque, force, by, false):
     assert check.false_alarms == false
     if not any(by):
         assert check.detected == ()
-        assert np.isnan([check.median_delay, check.longest_delay]).all()
-        assert check.largest_missed == 40.0
+        *delays, _, missed = check.figures.values()
+        assert np.isnan(delays).all()
+        assert missed == 40.0
 
 
 def test_without_a_wrench_the_force_is_not_known():
     torque, _ = truth()
     check = check_contacts(estimated(), limits(10.0, 1e3), torque, None)
-    assert np.isnan(check.smallest_detected)
+    assert np.isnan(check.figures["smallest_detected_N"])
     assert len(check.detected) == 2
 
 
@@ -97,8 +98,8 @@ def test_without_a_truth_the_alarms_are_listed_with_what_is_estimated():
     assert [round(c.start, 6) for c in check.contacts] == [5.1, 14.1]
     assert [c.peak_force for c in check.contacts] == [40.0, 25.0]
     assert (check.reference, check.false_alarms) == (None, None)
-    assert np.isnan(check.median_delay)
-    assert check.smallest_detected == 25.0
+    assert np.isnan(check.figures["median_delay_s"])
+    assert check.figures["smallest_detected_N"] == 25.0
     assert [remark.code for remark in check.remarks] == ["check-without-truth"]
 
 
@@ -110,7 +111,7 @@ def test_an_alarm_that_stays_on_detects_nothing_new():
     check = check_contacts(estimated(stays), limits(98.0, 1e3), *truth())
     found = [(c.by, c.already_above) for c in check.contacts]
     assert found == [("J1", False), ("", True), ("", True)]
-    assert np.isnan(check.largest_missed)
+    assert np.isnan(check.figures["largest_missed_N"])
 
 
 FIXTURES = Path(__file__).parent.parent.parent / "fixtures"

@@ -92,25 +92,17 @@ class ThresholdDetection(NamedTuple):
         return tuple(contact for contact in self.contacts if contact.by)
 
     @property
-    def median_delay(self) -> float:
-        """Of those detected, NaN if none is. [s]"""
-        return float(np.median([c.delay for c in self.detected] or np.nan))
-
-    @property
-    def longest_delay(self) -> float:
-        """Of those detected, NaN if none is. [s]"""
-        return max((c.delay for c in self.detected), default=np.nan)
-
-    @property
-    def smallest_detected(self) -> float:
-        """Peak force of the weakest detected contact, NaN if unknown. [N]"""
-        return float(np.fmin.reduce([c.peak_force for c in self.detected], initial=np.nan))
-
-    @property
-    def largest_missed(self) -> float:
-        """Peak force of the hardest missed contact, NaN without one. [N]"""
+    def figures(self) -> dict[str, float]:
+        """Delays and peak forces of those detected and missed, NaN without any."""
+        delays = [c.delay for c in self.detected]
+        peaks = [c.peak_force for c in self.detected]
         missed = [c.peak_force for c in self.contacts if not (c.by or c.already_above)]
-        return float(np.fmax.reduce(missed, initial=np.nan))
+        return {
+            "median_delay_s": float(np.median(delays or np.nan)),
+            "longest_delay_s": max(delays, default=np.nan),
+            "smallest_detected_N": float(np.fmin.reduce(peaks, initial=np.nan)),
+            "largest_missed_N": float(np.fmax.reduce(missed, initial=np.nan)),
+        }
 
 
 def check_contacts(

@@ -188,6 +188,7 @@ class Cycles(NamedTuple):
     period: float  #: Length of a cycle. [s]
     begin: float  #: First instant on the repeated path. [s]
     end: float  #: Last instant on it. [s]
+    deviation: float = 0.0  #: That of its `Period`. [rad]
 
     @property
     def whole(self) -> int:
@@ -219,13 +220,12 @@ def segment(recording: Recording, period: Period) -> Cycles:
         on_path |= abs(resample_columns(t + shift, t, q, np.nan) - q).max(axis=1) <= ON_PATH
     begin = settled(t, on_path, seconds)
     end = -settled(-t[::-1], on_path[::-1], seconds)
-    cycles = Cycles(seconds, begin, end)
     if not end - begin > seconds:
         raise ReferenceTorqueError(
             f"{recording.name}: only {max(end - begin, 0.0):.4g} s of the motion repeat, less than "
             f"the period of {seconds:.4g} s; give a free run of this motion with --free"
         )
-    return cycles
+    return Cycles(seconds, begin, end, period.deviation)
 
 
 def settled(t: Array, on_path: Mask, seconds: float) -> float:

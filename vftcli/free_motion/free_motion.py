@@ -21,7 +21,6 @@ from vftcli.free_motion.alignment import Alignment, align
 from vftcli.free_motion.cycles import (
     Cycles,
     FreeCycles,
-    Period,
     find_free_cycles,
     find_period,
     segment,
@@ -133,14 +132,10 @@ class FreeMotion(Shown):
         return replace(self, log=log, runs=runs)
 
     @cached_property
-    def period(self) -> Period:
-        """The period of the log's motion."""
-        return find_period(self.log.coarse.recording, self.choice.period)
-
-    @cached_property
     def cycles(self) -> Cycles:
         """The cycles of the log."""
-        return segment(self.log.coarse.recording, self.period)
+        recording = self.log.coarse.recording
+        return segment(recording, find_period(recording, self.choice.period))
 
     @cached_property
     def cycles_given(self) -> tuple[int, ...]:

@@ -82,12 +82,11 @@ Partners = tuple[Mapping[str, Sequence[Pairing]], list[Remark]]
 
 def partners_in_log(motion: FreeMotion) -> Partners:
     """The free cycles of a log, paired with the others."""
-    period, cycles, stated = motion.period, motion.cycles, motion.choice.period
-    free = motion.free_cycles
+    cycles, free, stated = motion.cycles, motion.free_cycles, motion.choice.period
     clocks = {"found": cycles.period}
     values = {
         "period_s": cycles.period,
-        "deviation_rad": period.deviation,
+        "deviation_rad": cycles.deviation,
         "whole": cycles.whole,
         "begin_s": cycles.begin,
         "end_s": cycles.end,

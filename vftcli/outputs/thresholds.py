@@ -77,15 +77,15 @@ def thresholds_grid(thresholds: Thresholds) -> Grid:
 def check_line(check: ThresholdDetection) -> str:
     """A check in a sentence."""
     count, detected = len(check.contacts), len(check.detected)
-    weakest, missed = check.smallest_detected, check.largest_missed
+    median, longest, weakest, missed = check.figures.values()
     if check.reference is None:
         least = f", the weakest at {significant(weakest)} N" if count else ""
         return f"{check.log}: {counted(count, 'alarm')}{least}"
     words = [f"{check.log}: {detected} of {count} contacts detected"]
     if detected:
         words += [
-            f"{1e3 * check.median_delay:.0f} ms after they begin (median)",
-            f"at most {1e3 * check.longest_delay:.0f} ms",
+            f"{1e3 * median:.0f} ms after they begin (median)",
+            f"at most {1e3 * longest:.0f} ms",
         ]
     if not isnan(weakest):
         words.append(f"the weakest detected {significant(weakest)} N")
@@ -130,10 +130,7 @@ def thresholds_record(
                 "log": check.log,
                 "reference": check.reference,
                 "detected": None if check.reference is None else len(check.detected),
-                "median_delay_s": check.median_delay,
-                "longest_delay_s": check.longest_delay,
-                "smallest_detected_N": check.smallest_detected,
-                "largest_missed_N": check.largest_missed,
+                **check.figures,
                 "false_alarms": check.false_alarms,
                 "untouched_h": check.untouched_h,
                 "contacts": check_rows(check),
