@@ -108,7 +108,7 @@ class ControlChoice(Choice):
         return super().takes(name) or not dot or section in GROUPS
 
     def start_pose(self, robot: "Robot") -> "Array":
-        """Joints at a release's target pose: as set, else the robot file's. (n,) [rad]"""
+        """Joints at a release's target pose, as set or the robot's. (n,) [rad]"""
         import numpy as np
 
         start = self.start or robot.admittance.get("start")
@@ -120,10 +120,7 @@ class ControlChoice(Choice):
         return np.array(start, float)
 
     def controllers(self, robot: "Robot") -> "tuple[Controller, ...]":
-        """The compared controllers, the traditional one first.
-
-        Their parameters are the robot's, then those that are set.
-        """
+        """The compared controllers by the robot's parameters, then those that are set."""
         from vftcli.admittance.law import controllers, from_table
 
         parameters = from_table(robot.admittance, robot.name, self.settings)

@@ -1,8 +1,7 @@
 """The closed loop in simulation: hand, arm, servo, sensing, observer and law.
 
-The simulator's arm is seen as a log would hold it. The servo holds a command for a control
-period. Latencies are from the true force; Figs 6 and 9 time them from detection to motion, and
-from the estimate's fall to the turn.
+The servo holds a command for a control period. Latencies are from the true force; Figs 6
+and 9 time them from detection to motion, and from the estimate's fall to the turn.
 """
 
 from dataclasses import replace
@@ -53,8 +52,8 @@ class ClosedLoop(NamedTuple):
     dragged: Mask  #: Phases. (T, 6)
     commanded: Array  #: Deviation X̃ that was commanded. (T, 6) [m, rad]
     q: Array  #: Joint positions. (T, n) [rad]
-    moved: Array  #: Deviation of the flange itself from where it started. (T, 6) [m, rad]
-    reached: Mask  #: Whether the inverse kinematics found the commanded pose. (T,)
+    moved: Array  #: Deviation of the flange itself. (T, 6) [m, rad]
+    reached: Mask  #: Whether the commanded pose was found. (T,)
     zero: Array  #: Zero of the wrench that was removed. (6,) [N, N·m]
     simulation: Simulation | None  #: Log and truth, None if the arm ran away.
 
@@ -72,9 +71,8 @@ class ClosedLoop(NamedTuple):
 class OnlineKalman:
     """Disturbance Kalman filter, sample by sample at a constant rate, x̂⁰ = [p⁰; 0].
 
-    A torque averaged over the sampling interval enters as it is: the trapezoid is half a
-    sample late, and makes a false force of every jerk. An instantaneous one enters by the
-    trapezoid, like the rest of μ, as in `KalmanObserver.estimate`.
+    An averaged torque enters as it is: the trapezoid is half a sample late, and makes a false
+    force of every jerk. An instantaneous one enters by it, like the rest of μ.
     """
 
     def __init__(
@@ -112,13 +110,11 @@ class OnlineKalman:
         return self.tau
 
     def wrench(self, q: Array) -> Array:
-        """Flange force pinv(J_Fᵀ) τ̂ of (46), base axes; zero if unknown. (6,) [N, N·m]
-
-        An unknown force must not move the arm.
-        """
+        """Flange force pinv(J_Fᵀ) τ̂ of (46), base axes; zero if unknown. (6,) [N, N·m]"""
         pin, frame = self.pin, self.model.getFrameId("flange")
         J = pin.computeFrameJacobian(self.model, self.data, q, frame, pin.LOCAL_WORLD_ALIGNED)
         (wrench,), (known,) = wrench_of(self.tau[None], J[None])
+        # An unknown force must not move the arm.
         return wrench if known else np.zeros(6)
 
 
@@ -146,7 +142,7 @@ class Loop:
         self.reached, self.zeros, self.zero = True, list[Array](), np.zeros(6)
 
     def sample(self) -> None:
-        """Run the observer on one noisy sample of positions, velocities and torques."""
+        """Run the observer on one noisy sample."""
         arm = self.arm
         q, dq, torque = (size * self.rng.standard_normal(len(size)) for size in self.noise)
         self.q_measured = rounded(arm.q + q, arm.scenario.sensing.position_step)
@@ -196,7 +192,7 @@ class Loop:
         return Reference(self.q_command[None], speed[None], np.zeros_like(speed)[None])
 
 
-#: In all built-in closed-loop scenarios nothing touches the arm in this span. [s]
+#: No built-in closed-loop scenario touches the arm in this span. [s]
 UNLOADED = (0.5, 3.0)
 
 
@@ -206,10 +202,7 @@ def loop_of(
     observers: ObserverChoice,
     **how: Any,  # noqa: ANN401 - of `run_closed_loop`
 ) -> tuple[ClosedLoop, Robot]:
-    """A closed-loop run of the last controller on the first observer, and its arm.
-
-    As `run_closed_loop`; the arm holds still while nothing touches it.
-    """
+    """A run of the last controller on the first observer, and its arm."""
     scenario = load_scenario(name, ())
     arm = load_robot(scenario.robot)
     observer = observers.build(arm, 1.0 / log_rate(scenario.sensing, arm))[0][0]
@@ -231,9 +224,8 @@ def run_closed_loop(
 ) -> ClosedLoop:
     """A closed-loop run: a scenario's contacts on an arm under admittance control.
 
-    It begins at the trajectory's start. The torque is the "average" over the sampling
-    interval, or the last "instant". In the unloaded span `zero` [s] the arm holds still, and
-    its mean wrench is removed.
+    The torque is the "average" over the sampling interval, or the last "instant". In the
+    span `zero` [s] the arm holds still, and its mean wrench is removed.
     """
     if torque not in {"average", "instant"}:
         raise ParameterError(f"torque is {torque!r}; it is average or instant")

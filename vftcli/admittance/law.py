@@ -4,9 +4,8 @@ In the recovery phase an axis has K = αK_d e^{|v|/v₀}, M = M_d e^{−|v|/v₀
 so that B = 2ξ√(M_d K_d) is constant. The traditional controller has α = 1, no v in K and
 M, and B = B_d. The printed energy (52) rises; W falls.
 
-Semi-implicit Euler (49)–(51) is stable if 2TsB/M + Ts²K/M < 4, and M falls and K rises
-with speed. Without a speed limit the law escapes: from far enough it becomes infinitely
-fast in finite time.
+Semi-implicit Euler (49)–(51) is stable if 2TsB/M + Ts²K/M < 4. Without a speed limit the
+law escapes: from far enough it becomes infinitely fast in finite time.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -64,7 +63,7 @@ class Admittance:
     threshold: Array  #: F_tsd: above it an axis is dragged, below it recovers.
     #: ξ of (47), not in the paper; NaN: the drag phase's, B_d/(2√(M_d K_d)).
     xi: Array | float = np.nan
-    #: A dragged axis recovers below 1 − this share of the threshold; the paper's is 0.
+    #: A dragged axis recovers below 1 − this share of the threshold.
     hysteresis: Array | float = 0.0
     speed_limit: Array | float = np.inf  #: Ẋ_tsd; infinite for none.
     speed_scale: Array | float = 1.0  #: v₀ in e^{|v|/v₀}: 1 m/s and 1 rad/s.
@@ -146,10 +145,7 @@ def from_table(
 
 
 def parse_settings(assignments: Sequence[str]) -> dict[str, dict[str, Any]]:
-    """Read ``SECTION.PARAMETER=VALUE`` assignments of the admittance; see `GROUPS`.
-
-    ``xi=1`` without a section is ``admittance.xi=1``.
-    """
+    """Settings by ``SECTION.PARAMETER=VALUE``, a key of `GROUPS` first."""
     settings: dict[str, dict[str, Any]] = {}
     for text in assignments:
         left, value = assignment(
@@ -209,10 +205,7 @@ class Controller:
 
     @cached_property
     def escape(self) -> Array:
-        """Largest deviation from which a release without a speed limit returns. (6,)
-
-        From rest; infinite for the traditional controller. [m, rad]
-        """
+        """Largest deviation from which a release from rest returns, or ∞. (6,) [m, rad]"""
         p = self.parameters
         distinct, each = np.unique(self.xi, return_inverse=True)
         factor = np.array([escape_factor(xi) for xi in distinct.tolist()])[each]
@@ -304,7 +297,7 @@ def escape_factor(xi: float) -> float:
     its neighbours, it ends at z = y = Y*. Y*(0) = 1/√2, the bound that holds for every ξ.
     """
     far = 12.0 * min(1.0, 5.0 / max(xi, 1e-12))
-    steps = int(max(2000.0, 8.0 * (xi * far) ** 2))  # the path attracts at up to 4ξ²u
+    steps = int(max(2000.0, 8.0 * (xi * far) ** 2))  # it attracts at up to 4ξ²u
     h = -far / steps
     z = xi * far + np.sqrt((xi * far) ** 2 + far)
 

@@ -16,7 +16,7 @@ from vftcli.signals.errors import ParameterError
 from vftcli.signals.pose import exp_matrix, exp_quaternion, log_quaternion, quaternion_product
 
 PAUSE = 1.0  #: Drags of one axis closer than this are one. [s]
-#: Return time → share of the deviation at release inside which the axis has to stay.
+#: Return time → share of the deviation at release.
 SHARES = {"return_10_s": 0.10, "return_2_s": 0.02}
 #: A release below this share of the largest deviation has no return. [1]
 RELEASED = 0.2
@@ -117,7 +117,7 @@ def run(
     x: Array | float = 0.0,
     v: Array | float = 0.0,
 ) -> AxisMotion:
-    """The motion under one force record, each axis in the phase the record puts it in.
+    """The motion under one force record and its phases.
 
     Force (T, 6) [N, N·m] and phases (T, 6) are those of `Phases`, the start that of
     `Recursion`. A law may end in infinities: see `AxisMotion.escaped`.
@@ -212,10 +212,7 @@ def row_of(
 
 
 def return_time(t: Array, x: Array, drag: Drag, share: float) -> float | None:
-    """Time until an axis stays within `share` of its deviation at release. [s]
-
-    None if the axis is still outside when the record ends or the next drag begins.
-    """
+    """Time until an axis stays within `share` of its release; None if it does not. [s]"""
     after = abs(recovery_of(x, drag))
     if not len(after):
         return None
@@ -227,13 +224,13 @@ def return_time(t: Array, x: Array, drag: Drag, share: float) -> float | None:
 
 
 def overshoot(x: Array, drag: Drag) -> float | None:
-    """Overshoot to the other side after release, as a share of the deviation then."""
+    """Overshoot after release, as a share of the deviation then."""
     after = recovery_of(x, drag)
     return max(np.max(-after / after[0]), 0.0) if len(after) else None
 
 
 def recovery_of(x: Array, drag: Drag) -> Array:
-    """Deviations from a drag's release on; empty if they escape or start near zero."""
+    """Deviations from a drag's release on; none if they escape or are small."""
     after = x[drag.release : drag.end]
     least = RELEASED * abs(x[drag.begin : drag.end]).max()
     return after if np.isfinite(after).all() and abs(after[0]) > least else after[:0]
@@ -276,10 +273,7 @@ class JointPath(NamedTuple):
 
 
 def follow(robot: Robot, start: Array, x: Array, period: float) -> JointPath:
-    """Joints along flange deviations (T, N, 6) [m, rad] from `start` (n,) [rad].
-
-    Deviations are in base axes, rotation vectors last, a `period` [s] apart.
-    """
+    """Joints along base-axes deviations (T, N, 6), a `period` [s] apart, from `start`."""
     solver = FlangeSolver(robot)
     rotation, translation = solver.pose(start)
     q, reached = np.empty((*x.shape[:2], len(start))), np.zeros(x.shape[:2], bool)

@@ -97,7 +97,7 @@ class Replay:
         W must not rise in a recovery phase into which no force enters; V is that of (52).
         """
         dragged, motion = self.phases.dragged, self.motion
-        # Row k + 1 is in the phase of the force before it, row 0 in the first one's.
+        # Row k + 1 is in the phase of the force before it.
         hidden = np.concatenate([dragged[:1], dragged])
         W, V = np.full((2, *motion.x.shape), np.nan)
         with np.errstate(over="ignore", invalid="ignore"):
@@ -124,8 +124,7 @@ def replay(
 ) -> Replay:
     """Motions of controllers that hold a log's first pose, driven by its wrench.
 
-    The wrench is in base axes about the flange point, none where unknown; q are the log's
-    joint positions on its clock. (T, n) [rad]
+    The wrench is in base axes about the flange point; q (T, n) [rad] is on its clock.
     """
     if len(wrench.t) > 1:
         refuse_mostly_gap(wrench.t, median_step(wrench.t))
@@ -159,10 +158,7 @@ def replay_release(
     duration: float | None = None,
     anyway: bool = False,
 ) -> Replay:
-    """Motions after release at rest at `x` (6,) [m, rad] from pose `start` (n,) [rad].
-
-    `duration` [s] is None for as long as it takes.
-    """
+    """Motions after release at rest at `x` (6,) [m, rad] from pose `start` (n,) [rad]."""
     if not x.any():
         raise ParameterError(
             "a release needs a deviation, as --release x=0.3 [m] or --release rz=0.5 [rad]"
@@ -212,7 +208,7 @@ def settling(controllers: Sequence[Controller], x: Array) -> float:
 
 
 def on_control_clock(t: Array, period: float) -> tuple[Array, Indices]:
-    """Times a period [s] apart (S,) [s] and the number of the newest sample then. (S,)"""
+    """Times a period apart (S,) [s], and the newest sample's number then. (S,)"""
     clock = t[0] + np.arange(np.floor((t[-1] - t[0]) / period + 1e-6) + 1) * period
     # Half a microsecond of slack, as stamps are printed.
     newest = t.searchsorted(clock + 5e-7 + 1e-3 * period, side="right") - 1
@@ -235,10 +231,7 @@ def drag_remarks(found: Replay) -> Iterator[Remark]:
 
 
 def trouble(found: Replay) -> Iterator[Remark]:
-    """Remarks on errors, limits and impossible travel.
-
-    Where every pose is reached the travel is plausible, however long.
-    """
+    """Remarks on errors, limits and impossible travel."""
     motion, path, travel = found.motion, found.path, []
     for n, controller in enumerate(found.controllers):
         where = Where(controller.name)
@@ -257,6 +250,7 @@ def trouble(found: Replay) -> Iterator[Remark]:
             travel.append(np.nan_to_num(way, nan=np.inf).max())
         if path.speed[n] > 1.0:
             yield caution("joint-too-fast", where, share=path.speed[n])
+    # Where every pose is reached the travel is plausible, however long.
     if travel:
         hard = "-hard" if found.parameters.threshold_mode == "hard" else ""
         yield caution(f"travel-implausible{hard}", travel_m=max(travel))
@@ -276,7 +270,7 @@ class DrivingForce(NamedTuple):
 def stored_force(
     recording: Recording, robot: Robot, choice: WrenchChoice, observer: str
 ) -> DrivingForce:
-    """The virtual sensor's wrench of an observer's torque in a file of estimates."""
+    """The virtual sensor's wrench of an observer's stored torque."""
     if choice.solver == SMOOTHER:
         raise ParameterError(
             "virtual-sensor.solver=smoother needs the log itself, not a file of estimates; "

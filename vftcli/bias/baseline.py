@@ -1,8 +1,7 @@
 """A log's free part and spectra, and its observers' input less the bias.
 
-The bias of the whole log (`vftcli.bias.whole_log`) comes off μ before an observer runs:
-for `best`, tuned on the spectra of the rest, and for the others if
-``bias.method=whole-log``.
+The whole log's bias comes off μ before an observer runs: for `best`, tuned on the spectra
+of the rest, and for the others if ``bias.method=whole-log``.
 """
 
 from dataclasses import dataclass, field, replace
@@ -47,10 +46,7 @@ class Baseline:
     _made: dict[Run, Run] = field(init=False, repr=False, compare=False, default_factory=dict)
 
     def of(self, run: Run) -> Run:
-        """The log or a free run as the observers have it. Made once.
-
-        If a correction was looked for, without samples that stand alone.
-        """
+        """The log or a free run as the observers have it, steadied. Made once."""
         if not self.on_correction:
             return run
         run = run.steadied
@@ -70,8 +66,7 @@ class Baseline:
     def tunable(self) -> Spectra | None:
         """The spectra if gains may come from them, else None.
 
-        Not from a free part by the fit with a load in it: 2.8 kg on a UR10e gave the
-        slowest gains.
+        Not from a fit's free part with a load: 2.8 kg on a UR10e gave the slowest gains.
         """
         return None if self.by_fit and self.load is not None else self.spectra
 
@@ -171,7 +166,7 @@ class FreeReading(NamedTuple):
 
 
 def free_reading(found: Baseline, observer: Observer, estimate: ExternalTorque) -> FreeReading:
-    """An observer's run along the free pieces; on the log it is its estimate."""
+    """An observer's reading of the free pieces."""
     log = found.motion.log
     read, rests = [np.zeros((0, estimate.joints))], [np.zeros((0, estimate.joints), bool)]
     for run, inside in found.pieces:
@@ -208,7 +203,7 @@ def find_baselines(motion: FreeMotion, choice: RefinementChoice, *, best: bool) 
 
 
 def on_quiet_samples(found: Baseline, quiet: Mask) -> Baseline:
-    """A baseline without spectra, with the bias fit's free part (T,) if enough."""
+    """A baseline with the bias fit's free part (T,), if enough."""
     share = quiet.mean()
     remark = fact("free-by-the-fit", share=share)
     if found.motion.choice.is_given and found.missing is not None:

@@ -60,7 +60,7 @@ def smooth_motion(run: Run) -> SmoothMotion:
 
 
 def without_waits(t: Array) -> Array:
-    """A clock that waits no longer than `WAIT`; itself where it does not. (T,) [s]"""
+    """A clock that waits no longer than `WAIT`. (T,) [s]"""
     steps = np.diff(t)
     longest = max(WAIT, GAP * median_step(t)) if len(t) > 1 else WAIT
     if not np.any(steps > longest):
@@ -91,10 +91,10 @@ def friction_shapes(run: Run, gravity: Array) -> Iterator[Array]:
 
 
 def usual_friction(robot: Robot) -> Array:
-    """Dry, viscous and quadratic friction by which a model's error is judged. (3, n)
+    """Dry, viscous, quadratic friction that judges a model's error. (3, n)
 
-    Other curves are fitted. A sigmoid has neither slope nor bend of its own: seven tenths
-    of its amplitude count as dry. [N·m], [N·m·s/rad], [N·m·s²/rad²]
+    Other curves are fitted; of a sigmoid's amplitude seven tenths count as dry.
+    [N·m], [N·m·s/rad], [N·m·s²/rad²]
     """
     found = np.zeros((robot.joints, 3))
     dry = dry_friction(robot.friction, robot.joints)
@@ -125,10 +125,7 @@ class ModelError(NamedTuple):
         return np.concatenate([self.inertial, mine.ravel()])
 
     def torque(self, run: Run, motion: SmoothMotion) -> Array:
-        """Torque A δx that a model with this error lacks. (T, n) [N·m]
-
-        The smooth motion is that of the coarse run.
-        """
+        """Torque A δx that a model with this error lacks, by coarse motion. (T, n) [N·m]"""
         chain = run.robot.loaded_chain
         wrong = with_parameters(
             chain, chain_parameters(chain) + self.inertial, chain.rotor_inertia + self.rotor

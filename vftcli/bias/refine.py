@@ -29,11 +29,11 @@ STICTION = "stiction at rest"
 
 
 def with_band(found: Baseline, reading: FreeReading) -> ExternalTorque:
-    """The estimate with its band, marked in motion; itself if nothing is known."""
+    """The estimate with its band; itself if nothing is known."""
     estimate, spectra, run = reading.estimate, found.spectra, found.motion.log
     called, off, tau = None, found.correction, estimate.tau
     if off is not None and np.count_nonzero(off.free) >= ENOUGH:
-        # Slow loads of the fit are no error of a reading, nor, without any, is the free part's.
+        # Slow loads of the fit, or else the free part's, are no error of a reading.
         if off.load.any():
             tau = tau - resample_columns(run.t, fitted_times(run), off.load)
         elif found.load is not None:
@@ -44,7 +44,7 @@ def with_band(found: Baseline, reading: FreeReading) -> ExternalTorque:
         missed = spectra.missed(reading.observer.frequency_response(*asked))
         error = free_error(reading.samples, reading.resting, run.dry_friction)
         if called is not None and found.by_fit:
-            error = called  # the free part is these samples; their loads are no error
+            error = called  # the free part is these samples
         elif called is not None:
             # A stated part is short and often at rest: the larger of both counts.
             moving = np.maximum(error.moving, called.moving)
@@ -61,10 +61,9 @@ def with_band(found: Baseline, reading: FreeReading) -> ExternalTorque:
 def stated_band(found: Baseline, called: FreeError | None) -> Array:
     """Band of `best` without spectra, by the robot's own numbers. (T, n) [N·m]
 
-    Friction is wrong by a fifth, as is usual (`model_error.expected_error`); with a
-    fitted bias the band is the rest of it, and the readings where its fit sees no
-    contact. Torque that the gains leave out is unknown. In a log of a few samples, or
-    mostly gaps, a moving joint has `UNSEEN` of its dry friction.
+    Friction is wrong by a fifth, as is usual; with a fitted bias the band is the rest of it,
+    and the readings where its fit sees no contact. In a log of a few samples, or mostly
+    gaps, a moving joint has `UNSEEN` of its dry friction.
     """
     run = found.motion.log
     friction, nothing = run.dry_friction, np.zeros_like(run.dry_friction)
@@ -131,10 +130,7 @@ def friction_share(dq: Array, tau: Array) -> Array:
 
 
 def limits_remark(name: str, causes: Mapping[str, Array], stuck: Mask) -> Remark:
-    """Each joint's largest cause of error, and its part of all.
-
-    Hidden stiction is an error of a standing joint, one of `stuck`. (n,)
-    """
+    """Each joint's largest cause of error, stiction if `stuck` (n,), and its part."""
     felt = {**causes, STICTION: np.where(stuck, causes[STICTION], 0.0)}
     sizes = np.array([*felt.values()])
     named = [list(felt)[k] for k in sizes.argmax(axis=0)]

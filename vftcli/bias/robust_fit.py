@@ -5,9 +5,8 @@ solution minimises Σ w (d + A u)² + Σ u². A joint's row has its own columns,
 only its two knots about a sample: sums go block by block.
 
 A hand that always leans on the arm looks like mass. So there are columns of slow external
-loads too: a wrench at the flange, forces at elbow and wrist on the links before them. By
-the lever rule these make a force anywhere along the arm. The estimate keeps their torque:
-in doubt a torque is a push.
+loads too: a wrench at the flange, forces at elbow and wrist. By the lever rule these make
+a force anywhere along the arm. The estimate keeps their torque: in doubt it is a push.
 
 The first fit weighs samples down for all joints together: several feel a contact. The second
 fits the samples below a threshold, with the loads. Each fold of the free samples is predicted
@@ -38,8 +37,7 @@ WRENCH = 6  #: Components of the flange's wrench, the first loads.
 class SlowLoads(NamedTuple):
     """Columns of slow external loads along the samples of a fit."""
 
-    #: External torque of one SD of each component, sign reversed: the
-    #: flange's wrench, then forces along the arm. (S, n, m) [N·m]
+    #: −τ_ext of one SD of the flange's wrench, then of forces along the arm. (S, n, m) [N·m]
     torque: Array
     knot: Indices  #: The knot before each sample. (S,)
     share: Array  #: A sample's way to the next one, 0 … 1. (S,)
@@ -234,10 +232,7 @@ class WholeLogFit:
 
 
 def fit_robustly(rows: Rows, step: float, dry: Array) -> WholeLogFit:
-    """The fit of a model's error, and the log's contact-free samples.
-
-    Samples are a step [s] apart; `dry` is the joints' friction. (n,) [N·m]
-    """
+    """The fit of a model's error at a step [s], with dry friction (n,) [N·m]."""
     counted = max(1.0, CORRELATED / step)
     least = np.maximum(LEAST_SCALE * dry, LEAST_TORQUE)
     residual, scale = first_fit(rows, step, counted, least)
@@ -250,10 +245,7 @@ def fit_robustly(rows: Rows, step: float, dry: Array) -> WholeLogFit:
 
 
 def first_fit(rows: Rows, step: float, counted: float, least: Array) -> tuple[Array, Array]:
-    """Residual (S, n) without loads, and its scale.
-
-    So many samples count as one; the scale (n,) is at `least` (n,). [N·m]
-    """
+    """Residual (S, n) without loads, and its scale, at `least` (n,). [N·m]"""
     held = SlowLoads(rows.loads.torque[:, :, :0], 0 * rows.loads.knot, rows.loads.share, 1)
     rows, residual = replace(rows, loads=held), rows.d
     quiet = np.quantile(abs(residual), QUIET_SHARE, axis=0)
@@ -306,7 +298,7 @@ class Guarded(NamedTuple):
 
 
 def guarded(fit: WholeLogFit, dq: Array) -> Guarded:
-    """A fit tested on folds of its free samples; joint velocities dq (S, n) [rad/s]."""
+    """A fit tested on folds of its free samples; dq is (S, n). [rad/s]"""
     moves = faster(dq)
     judged = moves | (moves[fit.free].mean(axis=0) < SELDOM)
     folds = [(int(f[0]), int(f[-1]) + 1) for f in np.array_split(np.flatnonzero(fit.free), FOLDS)]

@@ -46,8 +46,7 @@ from vftcli.signals.filters import derivative, zero_phase
 from vftcli.signals.remarks import Remark, caution, fact, on_joints
 from vftcli.signals.rest import faster
 
-#: Least motion, first to last: in less, inertia looks like a push; friction alone is
-#: fitted. [s]
+#: Least motion, first to last: in less, friction alone is fitted. [s]
 LEAST_MOTION = 10.0
 #: Less motion tells nothing: ten times `CORRELATED`. [s]
 LEAST_FRICTION = 3.0
@@ -61,7 +60,7 @@ USUAL = 1.1
 LED = 1.4
 #: A joint's friction is corrected in full with so much error left …
 CLEAR = 0.45
-#: … and not at all with so much: on UR10e logs 5 s leave .3 to .9; led by hand .4 to .9. [1]
+#: … and not at all with so much: 5 s of a UR10e leave .3 to .9; led .4 to .9. [1]
 UNCLEAR = 0.6
 RATE = 30.0  #: Samples a second that are fitted, …
 LONG = 60.0  #: … up to a log of this length [s], …
@@ -73,20 +72,19 @@ MOST_SAMPLES = 36_000  #: Samples that are fitted at most: an hour's.
 class WholeLogBias:
     """The model's bias along a log."""
 
-    #: Share of the model's error that a joint loses: 1 where it clearly predicts. (n,)
+    #: Share of the model's error that a joint loses. (n,)
     weight: Array
     bias: Array  #: Subtracted torque, zero on joints left alone. (T, n) [N·m]
     #: Deviation of the model's error as fitted, and of a part of it where that is
     #: subtracted: all or nothing, by chance. (T, n) [N·m]
     sd: Array
-    #: Samples that the fit calls free of contact, all where nothing was fitted. (T,)
+    #: Samples that the fit calls free, all without a fit. (T,)
     free: Mask
-    #: External torque of the fit's slow loads, kept in estimates; or zero. At
-    #: `fitted_times`. (S, n) [N·m]
+    #: τ_ext of the fit's slow loads, kept in estimates, at `fitted_times`. (S, n) [N·m]
     load: Array
     remarks: tuple[Remark, ...]  #: What was applied, or why not.
-    fitted: bool = True  #: Whether there was a fit; else `free` and `load` say nothing.
-    #: The model's error on the joints left alone too, None where nothing was fitted.
+    fitted: bool = True  #: Whether there was a fit.
+    #: The model's error on all joints, None without a fit.
     error: ModelError | None = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
@@ -130,8 +128,7 @@ def whole_log_bias(run: Run) -> WholeLogBias:
             tried = guarded(fit, motion.dq[::stride])
             if span < LEAST_MOTION:
                 if tried.solution is not None:
-                    # A hand that leads the arm looks like less friction: they differ in size
-                    # and in foresight.
+                    # A leading hand looks like less friction, of other size and foresight.
                     torque = np.mean(fit.rows.modelled(tried.solution.model) ** 2, axis=0)
                     usual = np.array([np.sum(c**2, axis=1).mean() for c in columns])
                     worst = np.sqrt(torque / np.maximum(usual, np.finfo(float).tiny)).max()

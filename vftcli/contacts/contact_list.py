@@ -52,7 +52,7 @@ FIRST_COLUMNS = ("number", "start_s", "stop_s", "peak_s", "peak_force_N")
 
 
 class ForceCourse(NamedTuple):
-    """|F| of a contact from its start to its end, at the place of its force."""
+    """|F| of a contact from its start to its end."""
 
     t: Array  #: Time. (K,) [s]
     force: Array  #: |F|. (K,) [N]
@@ -70,7 +70,7 @@ class Contact(Shown):
     start: float  #: When it begins. [s]
     stop: float  #: When it ends. [s]
     peak: float  #: When |F| is largest. [s]
-    #: Whether it is a load, or a wrong payload or model; its numbers are then means.
+    #: Whether it is a load, or a wrong model; its numbers are then means.
     is_load: bool = False
     peak_force: float | None  #: |F| at the peak. [N]
     #: Half width of its 95 % band, what the place may change in it. [N]
@@ -86,7 +86,7 @@ class Contact(Shown):
     #: Evidence of its best place less that of every other part. [nats]
     lead: float | None
     places: tuple[int, ...]  #: Links that fit; 0 is the flange.
-    evidence: float | None  #: Evidence of the best place less that of nothing. [nats]
+    evidence: float | None  #: Best place's evidence over nothing. [nats]
     joint_torque: Array  #: Torque on each joint at the peak. (n,) [N·m]
     joint_torque_sd: Array  #: Its standard deviation. (n,) [N·m]
     at_rest: bool  #: Whether no joint moves at the peak.
@@ -94,7 +94,7 @@ class Contact(Shown):
     vendor_force: float | None = None
     #: |F| of the log's own wrench at the peak, None without one. [N]
     sensor_force: float | None = None
-    course: ForceCourse | None = None  #: |F| from start to end, None without a force.
+    course: ForceCourse | None = None  #: |F| from start to end, or None.
     #: Whether neither free motion nor a reference checks its size.
     inferred: bool = False
     remarks: tuple[Remark, ...] = ()  #: Limits of this row.
@@ -116,7 +116,7 @@ class Contact(Shown):
 
     @property
     def size(self) -> str:
-        """|F| at the peak with its band or range; without a force joint torques."""
+        """|F| at the peak with its band or range, or joint torques."""
         if self.peak_force is None:
             return f"{joined(self.joint_torque)} N·m"
         if self.place_unknown and self.anywhere:
@@ -154,13 +154,13 @@ class Contact(Shown):
 
     @property
     def size_known(self) -> bool:
-        """Whether its force exceeds its band and depends on no unknown place."""
+        """Whether its force exceeds its band and its place is known."""
         size, band = self.peak_force, self.peak_band
         return not (size is None or band is None or self.place_unknown or size <= band)
 
     @property
     def place_unknown(self) -> bool:
-        """Whether its size depends on where it touched, and that is unknown."""
+        """Whether its size depends on an unknown place."""
         return any(remark.code == "size-goes-with-place" for remark in self.remarks)
 
     @property
@@ -202,7 +202,7 @@ class CarriedLoad(NamedTuple):
 
     @classmethod
     def of(cls, load: "FreeLoad", run: "Run") -> "CarriedLoad":
-        """A log's load, with the payload of the robot's file that weighs as much."""
+        """A log's load, with the robot's payload that weighs as much."""
         moves = run.t[faster(run.dq).any(axis=1)]
         ends = moves if len(moves) else run.t
         apart = [(abs(p.mass - load.mass), name) for name, p in run.robot.payloads.items()]
@@ -295,16 +295,13 @@ class ContactList(Shown):
         return pl.DataFrame([c.row() for c in self.contacts], infer_schema_length=None)
 
     def plot(self) -> "Figure":
-        """A matplotlib figure of each contact's |F| and band, not shown or saved."""
+        """A matplotlib figure of each contact's |F| and band."""
         figures = import_module("vftcli.outputs.figures")
         figure: Figure = figures.on_paper(figures.force_drawing(self))
         return figure
 
     def weighed(self, load: tuple[float, float] | None, doubts: Set[str]) -> "ContactList":
-        """The list, given the load [kg] with its deviation and the findings in doubt.
-
-        Without a joint's effort every row is a candidate.
-        """
+        """The list, given the load [kg] with its SD and the findings in doubt."""
         carried, rows, others = self.load, self.contacts, self.candidates
         if carried and load:
             carried = carried._replace(mass=load[0], sd=load[1])
@@ -345,10 +342,8 @@ class ContactList(Shown):
 
     @property
     def tells_untouched(self) -> bool:
-        """Whether free motion shows that nothing touches the arm outside the rows.
-
-        A candidate alone may be a touch that the model hides.
-        """
+        """Whether nothing touches the arm outside the rows, by free motion."""
+        # A candidate alone may be a touch that the model hides.
         if self.basis != "free motion" or (self.candidates and not self.contacts):
             return False
         return not any(contact.is_load for contact in self.contacts)

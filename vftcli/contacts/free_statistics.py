@@ -58,14 +58,13 @@ LEVEL = 4.0  #: SDs of a joint's torque beyond which it is touched.
 #: Least length of a touch, and the pause that joins two. [s]
 LASTING, NEAR = 0.05, 0.2
 LEAST_MOVING = 50  #: Fewest samples in motion for a level of a joint.
-#: Basis on which contact and model error are told apart: known free motion, samples that
-#: the fit of the whole log calls free, the drives' dry friction, or nothing.
+#: Basis that tells contact from model error.
 Basis = Literal["free motion", "whole log", "friction", "none"]
 #: Remarks of the fit of the whole log on one that is too short for it.
 SHORT_LOG = {"whole-log-too-short", "whole-log-friction-unclear"}
-#: Fewest whole cycles of which free ones can be found: one has no other to compare with.
+#: Fewest whole cycles of which free ones can be found.
 LEAST_CYCLES = 2
-#: Length of the contacts that are made up in free motion [s], and how many at most.
+#: Length of contacts made up in free motion [s], and most of them.
 PSEUDO, MOST_PSEUDO = 0.6, 48
 
 
@@ -132,8 +131,7 @@ def free_statistics(motion: FreeMotion, bias: WholeLogBias) -> FreeStatistics | 
 def inferred_statistics(log: Run, bias: WholeLogBias) -> FreeStatistics | None:
     """Statistics of a log without known free motion, or None.
 
-    The whole log's model error is subtracted where its guard allows it, then a load. None
-    without dry friction where no whole joint is corrected.
+    None without dry friction where no whole joint is corrected.
     """
     if not (dry_torques(log.robot).any() or (bias.weight >= 1.0).any()):
         return None
@@ -178,7 +176,7 @@ def free_part(motion: FreeMotion) -> FreePart | None:
     """The free part of a log; None without one, or if it is doubtful."""
     try:
         part = motion.known
-    except ReferenceTorqueError:  # nothing repeats, or too little of it was recorded
+    except ReferenceTorqueError:  # nothing repeats for long enough
         if motion.choice.is_given:
             raise
         return None
@@ -198,8 +196,7 @@ def free_part(motion: FreeMotion) -> FreePart | None:
 def beyond_threshold(run: Run, level: Array | float) -> Mask:
     """Samples with a joint's torque beyond `LEVEL` SDs for a while.
 
-    (T,) The standard deviation is that of the observer's torque in free motion, the level
-    (n,) [N·m]; at rest and around it stiction adds to it.
+    The SD is the level (n,) [N·m]; at rest and around it stiction adds to it. (T,)
     """
     t, dry = run.t, dry_torques(run.robot)
     sd = np.maximum(level, DRY_SHARE * dry)
@@ -218,8 +215,7 @@ def observed(run: Run) -> Array:
 def observer_noise(run: Run) -> Array:
     """SD of the observer torque's noise, touched or not. (n,) [N·m]
 
-    From second differences over twice the observer's time, of six times the variance of
-    white noise: pushes last longer, and the median ignores their ends.
+    From second differences, of six times white noise's variance: pushes last longer.
     """
     torque = observed(run)
     step = max(round(2.0 / (GAIN * median_step(run.t))), 1)
@@ -228,7 +224,7 @@ def observer_noise(run: Run) -> Array:
 
 
 def torque_level(pieces: Sequence[RunSamples]) -> Array:
-    """q95|τ|/1.96 of each joint over the free samples in which it moves. (n,) [N·m]"""
+    """q95|τ|/1.96 of each joint over its free samples in motion. (n,) [N·m]"""
     uses = [(run, inside & (run.t >= run.t[0] + SETTLED)) for run, inside in pieces]
     torque = abs(np.concatenate([observed(run)[use] for run, use in uses]))
     moving = np.concatenate([faster(run.dq[use], REST) for run, use in uses])
@@ -240,10 +236,7 @@ def torque_level(pieces: Sequence[RunSamples]) -> Array:
 
 
 def self_test(free: FreeStatistics, prior: WrenchPrior) -> Array:
-    """Factor on each axis' SD, at least 1, that holds 95 % of made-up contacts. (6,)
-
-    They are of free motion: their wrench is truly zero.
-    """
+    """Factor ≥ 1 on each axis' SD that holds 95 % of made-up contacts. (6,)"""
     shares = []
     each = max(MOST_PSEUDO // max(len(free.free), 1), 4)
     for blocks in blocks_of(free.free, free.seconds):

@@ -49,13 +49,12 @@ from vftcli.wrench.model_error import error_process
 from vftcli.wrench.smoother import DRIVES, BlockLog, BlockSpan, hidden_by_blocks, smooth_wrench
 
 SHORTEST = 0.5  #: No contact is listed in a log shorter than this. [s]
-SLOWEST = 10.0  #: Rate below which a push of tenths of a second may go unseen. [Hz]
+SLOWEST = 10.0  #: Rate below which a push may go unseen. [Hz]
 #: Evidence over that of any row in the log's own free part.
 FALSE_MARGIN = 1.5
 #: No contacts so near to either end: filters begin there. [s]
 AT_ENDS = 0.3
-#: The arm rests around a contact if 95 % of the samples from so long before it to so
-#: long after are below `MOVES` in every joint. [s]
+#: The arm rests around a contact if so long about it 95 % of samples are slow. [s]
 AROUND = 1.0
 
 
@@ -83,7 +82,7 @@ def list_contacts(
 
 
 def check_log(run: Run) -> None:
-    """Raise unless a log is known at every sample, long enough and fast enough."""
+    """Raise unless a log is known throughout, long and fast enough."""
     recording, known = run.recording, np.all(np.isfinite(run.terms.p + run.terms.mu), axis=1)
     if not known.all():
         raise ParameterError(
@@ -169,7 +168,7 @@ def by_smoother(free: FreeStatistics, *, proven: bool) -> ContactList:
 
 
 def adjoining(runs: Sequence[BlockSpan], rows: Sequence[Contact]) -> list[list[int]]:
-    """Numbers of the rows in groups: joined where one has no size of its own."""
+    """Numbers of the rows in groups: joined where one has no size."""
     groups: list[list[int]] = []
     sized = [(row.peak_force or 0.0) > (row.place_band or 0.0) for row in rows]
     for i, (start, _) in enumerate(runs):
@@ -180,7 +179,7 @@ def adjoining(runs: Sequence[BlockSpan], rows: Sequence[Contact]) -> list[list[i
 
 
 def measured_rows(free: FreeStatistics, measurement: ContactMeasurement) -> list[Contact]:
-    """The rows of a measurement; short contacts' from finer blocks if there are any."""
+    """The rows of a measurement; of short contacts from finer blocks."""
     found, rows = measurement.found, measurement.rows()
     brief = [k for k, seconds in enumerate(found.lasts) if seconds < SHORT]
     if not brief or free.fine is None:
@@ -246,27 +245,24 @@ def without_list(run: Run) -> ContactList:
 EDGE = 1.0
 #: Share of the time since the first motion that makes a load.
 SHARE = 0.5
-#: Several contacts are one load if their forces add up to more than this share of
-#: their sizes: separate pushes come from different sides.
+#: Contacts are one load if their forces add up to this share of their sizes.
 ONE_SIDE = 0.95
 PIECE = 5.0  #: Length of the pieces that show the mean's spread. [s]
 BRIEF = 0.3  #: Longest row that a stop explains. [s]
-#: Moving, then stopped, then at rest, about a row's start; not so a knock at rest. [s]
+#: Moving, then stopped, then at rest, about a row's start. [s]
 BEFORE, AT_STOP, AFTER = (-0.25, -0.05), (-0.25, 0.1), (0.12, 0.35)
 RINGING = 0.05  #: Share of the speed before that ringing may leave at rest.
 
 
 def is_load(recording: Recording, contacts: Sequence[Contact]) -> bool:
-    """Whether contacts of one force fill over half of the time since first motion.
-
-    A load neither begins nor ends while the arm rests; a push may.
-    """
+    """Whether contacts of one force fill over half of the time since first motion."""
     moving = np.any(faster(recording.require("dq"), REST), axis=1)
     t = recording.t
     first = t[np.argmax(moving)]
     lasts = np.array([contact.stop - contact.start for contact in contacts])
     if lasts.sum() <= SHARE * (t[-1] - first):
         return False
+    # A load neither begins nor ends while the arm rests; a push may.
     for edge in (contacts[0].start, contacts[-1].stop):
         if t[0] + EDGE < edge < t[-1] - EDGE and not moving[abs(t - edge) < EDGE].any():
             return False

@@ -32,24 +32,20 @@ from vftcli.signals.remarks import Remark, caution
 from vftcli.wrench.model_error import error_process
 from vftcli.wrench.smoother import BENT, BlockLog, JacobianIn, WrenchPrior, hidden_by_blocks
 
-#: Factors on the model's deviations of force and moment: friction's errors are not
-#: Gaussian. Chosen on simulated seeds.
+#: Factors on SDs of force and moment, by simulation: friction is not Gaussian.
 WIDENED = np.repeat([1.3, 2.0], 3)
 BESIDE = 0.1  #: A cut this near to a row may have removed a part of it. [s]
 #: Share of its bend that a short contact's peak may hide.
 BENT_SHORT = 0.4
 #: Least correlation time of a contact, as a share of its length.
 OWN_TIME = 0.5
-#: A contact shorter than this [s] loses its peak below so many samples a second [Hz]: a
-#: tap's force lasts some 50 ms.
+#: A contact shorter than this [s] loses its peak below such a rate [Hz]: a tap lasts 50 ms.
 SHORT, SLOW = 0.25, 95.0
-#: Without known free motion the model's error may be large, and hides how a push begins and
-#: ends. It may act for so long before its first block and after its last: else its ends would
-#: be the model's error, and the push would look smaller. On simulated seeds of nine arms 14 %
-#: of the sizes were below their bands, so 2 %. [s]
+#: Without known free motion a push may act for so long beyond its blocks: else its ends would
+#: be model error, and it would look smaller. On nine simulated arms 14 % of the sizes were
+#: below their bands, so 2 %. [s]
 TAIL = 0.5
-#: A contact's place comes from the blocks with a force above this share of the peak,
-#: within so long [s] of it.
+#: A contact's place comes from blocks above this share of its peak, so near it [s].
 CORE, CORE_TIME = 0.5, 0.1
 #: SD of the moment about the point of a point force. [N·m]
 POINT_MOMENT = 1e-3
@@ -89,10 +85,7 @@ class ContactLocation(NamedTuple):
         return tuple(sorted(links))
 
     def spread(self, size: float) -> float:
-        """Error of the size for the place, 0 of a contact at the wrist alone. [N]
-
-        RMS over the points that fit, weighted by likelihood.
-        """
+        """RMS error of the size for the place, by likelihood; 0 at the wrist alone. [N]"""
         if self.parts == ["wrist"] or not self.is_force:
             return 0.0
         likely = np.exp(-0.5 * np.array([fit.score - self.fits[0].score for fit in self.fits]))
@@ -100,7 +93,7 @@ class ContactLocation(NamedTuple):
         return float(np.sqrt(likely @ apart**2 / likely.sum()))
 
     def sizes(self, size: float, band: float) -> tuple[float, float]:
-        """Smallest and largest |F| over the places that fit, bands included. [N]"""
+        """Smallest and largest |F| of places that fit, with bands. [N]"""
         fits = self.fits if self.is_force else []
         spans = [(size, band), *((fit.size, fit.band) for fit in fits)]
         high = max(s + b for s, b in spans)
@@ -113,11 +106,11 @@ class ContactMeasurement:
 
     run: Run  #: The log with its robot's model.
     found: Candidates  #: The contacts that were kept.
-    log: BlockLog  #: The log in blocks; under a contact joints may settle anew.
+    log: BlockLog  #: The log in blocks, by contacts.
     prior: WrenchPrior  #: Prior of the contacts' wrench.
     widening: Array  #: Factor on each axis' SD that free motion asks. (6,)
     bent: float  #: Share of a peak's bend that may be hidden.
-    tail: float = 0.0  #: How long a push may act before and after its blocks. [s]
+    tail: float = 0.0  #: How long a push may act beyond its blocks. [s]
 
     @classmethod
     def of(
@@ -139,7 +132,7 @@ class ContactMeasurement:
 
     @cached_property
     def quiet(self) -> tuple[Array, Array]:
-        """Mean and variance of the error beside contacts. (K, n) [N·m], [(N·m)²]"""
+        """Mean [N·m] and variance of the error beside contacts. (K, n)"""
         d, touched = self.log.blocks.d, covered(self.found.runs, len(self.log.blocks.d), 1)
         return quiet_error(d, self.log.process.hiding(touched))
 
@@ -258,7 +251,7 @@ class ContactMeasurement:
         )
 
     def part(self, number: int, location: ContactLocation) -> tuple[ArmPart, ArmPart, float]:
-        """The only part of the arm that fits, the likeliest, and its lead. [nats]"""
+        """The only part that fits, the likeliest, and its lead. [nats]"""
         names, best = arm_parts(self.run.robot.joints), dict[ArmPart, float]()
         for place, nats in zip(self.found.places, self.found.evidence[number], strict=True):
             part = names[place.link]

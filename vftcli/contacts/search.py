@@ -1,10 +1,9 @@
 """Search along one log: candidates of two kinds, split, each with evidence.
 
-The first kind is found by an interacting two-state filter (IMM) in joint space, for any
-arm and place. Its mode "free" is d = b + n, its mode "contact" d = b + x + n with x of
-every joint an Ornstein–Uhlenbeck process, as large as a push of 30 N and 3 N·m at the
-flange makes. The mode is shared by all joints, the states are each joint's own. It runs
-forward and backward in time for sharp starts and ends, for taps and for leans.
+The first kind is found by an interacting two-state filter (IMM) in joint space. Its mode
+"free" is d = b + n, its mode "contact" d = b + x + n with x of every joint an
+Ornstein–Uhlenbeck process, as large as a push of 30 N and 3 N·m at the flange makes. All
+joints share the mode. It runs forward and backward in time, for taps and for leans.
 
 The second is beyond a momentum observer's threshold: a slow rise, or one joint loaded
 alone, which looks like friction to the filter.
@@ -45,8 +44,7 @@ from vftcli.wrench.model_error import (
 )
 from vftcli.wrench.smoother import BlockLog, BlockSpan, WrenchPrior
 
-#: A torque beyond the threshold for longer than this beside a contact is part of it: no
-#: lag of the observer, no turn of friction. [s]
+#: A torque beyond the threshold for longer beside a contact is part of it, no lag. [s]
 LASTING = 1.0
 #: A push as it may be: SD of force and moment at the flange. [N, N·m]
 PUSH = np.repeat([30.0, 3.0], 3)
@@ -56,7 +54,7 @@ SEARCHES = (0.3, 0.5), (2.0, 3.0)
 WARM_UP, STRETCH = 5.0, 10.0
 BETWEEN = 30.0  #: Mean time from one contact to the next. [s]
 AT_FIRST = 0.1  #: Probability that a log begins in contact.
-#: Probability that a contact must reach in one direction of time, and in the other.
+#: Least probability of a contact in one direction of time, and in the other.
 SURE, LIKELY = 0.99, 0.5
 GAP = 0.12  #: Contacts closer than this are one. [s]
 MOST_ODDS = 300.0  #: Log odds are kept within ± this many nats.
@@ -109,10 +107,7 @@ class Candidates(NamedTuple):
 
 
 def search(run: Run, noise: TorqueNoise, level: Array, seconds: float) -> Candidates:
-    """Possible contacts along a log, in blocks of a length [s].
-
-    `noise` and `level`, the momentum observer's torque (n,) [N·m], are of free motion.
-    """
+    """Possible contacts along a log in blocks [s], by free motion's noise and level."""
     blocks = disturbance_blocks(run.terms, run.q, seconds)
     options = places(run.robot.loaded_chain, blocks.q)
     flange, J = options[0].jacobian, flange_jacobian(run.robot.loaded_chain, blocks.q)
@@ -124,7 +119,7 @@ def search(run: Run, noise: TorqueNoise, level: Array, seconds: float) -> Candid
     last = np.minimum(np.maximum(last, first + 1), len(blocks.t))
     beyond = [(a, b) for a, b in np.stack([first, last], axis=1).tolist() if a < b]
     struck = inside.copy()
-    # A load of many seconds looks like a model error: the search goes on around it.
+    # A long load looks like a model error: the search goes on around it.
     for start, stop in beyond:
         within, t = struck[start:stop], blocks.t[start:stop]
         for a, b in runs_of(~within) if within.any() else ():
@@ -155,10 +150,7 @@ def turned_round(blocks: Blocks) -> Blocks:
 def filtered_contacts(
     blocks: Blocks, processes: tuple[ErrorProcess, ErrorProcess], J: Array
 ) -> Mask:
-    """Blocks that the two-state filter calls contact. (K,)
-
-    Runs with a positive mean of both directions' log odds, one of them sure.
-    """
+    """Contact: runs of positive mean log odds, one of the two sure. (K,)"""
     size = np.sqrt(np.einsum("kij,i->kj", J**2, PUSH**2))
     sure, likely = (np.log(p / (1.0 - p)) for p in (SURE, LIKELY))
     inside = np.zeros(len(blocks.t), bool)
@@ -175,8 +167,7 @@ def two_state_odds(
 ) -> list[tuple[Array, Array]]:
     """Log odds of contact, forward and backward, for taps and for leans.
 
-    A long log is searched in stretches side by side, each after `WARM_UP` seconds, in
-    which the filter forgets its start.
+    A long log is searched in stretches side by side, each after `WARM_UP` seconds.
     """
     step, usual, many = steps(blocks), np.median(blocks.length), len(SEARCHES)
     step[0] = usual
@@ -256,10 +247,7 @@ def imm_predict(
 
 
 def imm_update(state: ImmState, d: Array, white: Array, spike: Array, none: Array) -> ImmState:
-    """The states updated by a block's disturbance.
-
-    A spike, by its log rate, counts a 40th.
-    """
+    """The states updated by a block's disturbance; a spike counts a 40th."""
     own = state.bx + state.xx
     # Covariance of b, as each mode has it, with d. (2, S, n)
     cross = state.bb.copy()

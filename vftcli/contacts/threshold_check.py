@@ -80,7 +80,7 @@ class ThresholdDetection(NamedTuple):
     log: str  #: The log.
     contacts: tuple[CheckedContact, ...]  #: The contacts, in the order of time.
     remarks: tuple[Remark, ...]  #: Limits of the numbers.
-    #: Source of the true contacts; without one (None) the alarms count as contacts.
+    #: Source of the true contacts; without one alarms count as contacts.
     reference: str | None = None
     #: Alarms that touch no contact, None without a reference.
     false_alarms: int | None = None
@@ -183,10 +183,7 @@ def counted_alarms(signals: ComparedSignals, thresholds: Thresholds) -> CountedA
 
 
 def left_out(free: Sequence[ComparedSignals], rate: float) -> tuple[CountedAlarms, ...]:
-    """False alarms of every free log at the thresholds of the others.
-
-    None of a single log, or if the others are all too short.
-    """
+    """False alarms of every free log at long enough others' thresholds."""
     others = ([*free[:k], *free[k + 1 :]] for k in range(len(free)))
     return tuple(
         counted_alarms(signals, find_thresholds(rest, rate))

@@ -1,9 +1,8 @@
 """Thresholds from motion that nobody touched, at a stated rate of false alarms.
 
 The largest maxima of 1 s blocks of a signal lie beyond a level u at λ per hour, by e on
-average, and a level x beyond u is passed at the rate λ exp(−(x − u)/e). A tail that bends
-(generalised Pareto) has one number more to learn from few maxima, and its rare levels
-came out too low.
+average, and a level x beyond u is passed at the rate λ exp(−(x − u)/e). Rare levels of a
+tail that bends (generalised Pareto) came out too low.
 """
 
 from collections.abc import Iterator, Sequence
@@ -23,11 +22,11 @@ if TYPE_CHECKING:
     import polars as pl
 
 
-SETTLING = 2.0  #: Left out at the start of every log: observers rise from zero. [s]
+SETTLING = 2.0  #: Left out at every log's start: observers rise. [s]
 BLOCK = 1.0  #: Length of the blocks of which maxima are used. [s]
 APART = 0.5  #: Passages closer than this are one event. [s]
 KNOWN = 0.5  #: A block counts if at least this share of its samples is known.
-#: Maxima beyond the level that tell a tail; below four its interval has no lower end.
+#: Maxima that tell a tail; below four its interval has no lower end.
 ENOUGH = 5
 #: Readings in a tail: at least, in each hour, and per block.
 LEAST_READINGS, AN_HOUR, SHARE = 30, 60.0, 5
@@ -111,7 +110,7 @@ def tail_of(maxima: Array) -> Tail | None:
 
 #: So many false alarms show a rate; fewer extrapolate it.
 DUE = 3.0
-LEAST = 1e-9  #: In place of a threshold of zero, so that there is a level. [N·m, N]
+LEAST = 1e-9  #: In place of a threshold of zero. [N·m, N]
 #: A log of this length has enough readings to tell its own tail. [s]
 LONG_ENOUGH = SETTLING + 5 * ENOUGH * BLOCK
 SELDOM = 0.5  #: A wrench known in a smaller share of samples gets a remark.
@@ -127,7 +126,7 @@ class ComparedSignals(NamedTuple):
     wrench: Array
     of_vendor: bool  #: Whether the torque is the robot's own estimate.
     logged_wrench: bool  #: Whether the wrench is the robot's own.
-    #: Axes of the wrench and the point of its moment, in words; "" without a wrench.
+    #: Axes of the wrench and point of its moment, or "".
     frame: str
 
     @property
@@ -176,7 +175,7 @@ class SignalThreshold(NamedTuple):
 
     @property
     def is_wide(self) -> bool:
-        """Whether its interval is wider than its value, which then says nothing."""
+        """Whether its interval is wider than its value."""
         return self.interval[1] - self.interval[0] > self.value
 
     @property
@@ -205,10 +204,7 @@ class Thresholds(Shown):
 
     @property
     def named(self) -> tuple[tuple[str, str, float, SignalThreshold], ...]:
-        """Name, unit, level, threshold of joints, axes and the force's size.
-
-        An axis without a threshold has the level NaN.
-        """
+        """Name, unit, level (NaN without one), threshold of joints, axes and |F|."""
         return (
             *((f"J{j}", "N·m", one.value, one) for j, one in enumerate(self.joints, start=1)),
             *((n, unit_of(n), x.level, x) for n, x in zip(AXES, self.axes, strict=False)),

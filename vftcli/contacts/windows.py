@@ -1,14 +1,11 @@
 """Windows of a log: evidence of its contacts, and their smoothed wrench.
 
-A contact may be at the flange or on a link; only the joints behind its place, which do
-not feel it, show where. Outside its contact a wrench is zero, so that the quiet blocks
-on both sides show the model error, and the contact is measured against it. Other
-contacts are hidden. The prior of the wrench is learned from the contacts.
+A contact may be at the flange or on a link; the joints behind its place, which do not
+feel it, show where. Outside its contact a wrench is zero: the quiet blocks on both sides
+show the model error. Other contacts are hidden, and the wrench's prior is learned.
 
-Evidence is the log likelihood of a stretch with a contact less that without, in nats:
-around every candidate the disturbance's likelihood under "nothing", a wrench at the
-flange, and a force and moment on each link, by the smoother's forward pass with the
-Jacobian of the place. The best place counts.
+Evidence is the log likelihood of a stretch with a contact less that without, in nats, by
+the smoother's forward pass with the Jacobian of the place. The best place counts.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -28,7 +25,7 @@ from vftcli.wrench.smoother import BlockLog, BlockSpan, JacobianIn, Lane, Wrench
 
 ArmPart = Literal["wrist", "forearm", "upper arm", "cannot tell"]  #: A part of the arm.
 POINTS = 10  #: Points along each link that a force is tried at.
-#: First link that is tried: on link 1 a force loads one joint, as friction does.
+#: First link that is tried: on link 1 a force looks like friction.
 FIRST_LINK = 2
 #: Lever of a force about the flange or a link's middle. [m]
 LEAST_LEVER = 0.1
@@ -47,7 +44,7 @@ class ContactPlace(NamedTuple):
 
 
 def places(chain: Chain, q: Array) -> list[ContactPlace]:
-    """The flange, and the middle of every link from the second on, at q (K, n)."""
+    """The flange, and the middle of every link from `FIRST_LINK` on."""
     poses = lru_cache(MOST_LANES)(lambda first, last: link_poses(chain, q[first:last]))
     at, n = poses(0, 1).translation[0], chain.joints
     found = [ContactPlace(0, LEAST_LEVER, jacobian_of(poses, n, 1.0))]
@@ -128,14 +125,12 @@ FORCES, MOMENTS = ((3.0, 300.0), (0.1, 50.0))
 #: Evidence over nothing, which may spike. [nats] In 299 s of real free motion one
 #: reversal had 15, all else but abrupt stops below 6.
 LEAST_EVIDENCE = 12.0
-#: The same in motion without known free motion. [nats] Model errors reach 82 on six
-#: arms; 75 to 200 find the same contacts.
+#: The same in motion that nobody named free. [nats] Model errors reach 82 on six arms.
 LEAST_IN_MOTION = 120.0
 LEAST_FORCE = 10.0  #: Smallest SD of a force that is tried. [N]
 LONGEST_TIME = 1.0  #: Longest correlation time of a moving wrench. [s]
 SIZES = 1.0, 3.0  #: Multiples of the SD that are tried.
-#: Longer candidates may also be a steady wrench, as a load's, of this correlation time:
-#: one that wanders pays for each block. [s]
+#: Longer candidates may also be a steady wrench of this time. [s]
 LASTING, STEADY_TIME = 1.5, 100.0
 
 
@@ -247,14 +242,12 @@ def smooth_lanes(lanes: Iterable[Lane], priors: Sequence[WrenchPrior]) -> list[W
 
 
 def likelihoods(lanes: Sequence[Lane]) -> Array:
-    """Log likelihood ln p(d) of every lane, comparable within one window. [nats]
-
-    Without prior nothing touches, and an innovation in the gate may be a spike.
-    """
+    """Log likelihood ln p(d) of every lane, comparable within one window. [nats]"""
     found = np.empty(len(lanes))
     for batch in batches(lanes):
         some = [lanes[i] for i in batch]
         model = assembled(some)
+        # Without prior nothing touches, but may spike.
         bare = some[0].prior is None
         nats = untouched_likelihood(some, model) if bare else log_likelihood(model)
         # Less the blocks behind the shorter lanes.
@@ -285,7 +278,7 @@ def learn_prior(
     prior: WrenchPrior,
     rounds: int,
 ) -> WrenchPrior:
-    """The prior by expectation and maximisation: τ_w by likelihood, σ by the mean."""
+    """The prior: τ_w by likelihood, σ by expectation and maximisation."""
     own = [*contact_lanes(log, runs, jacobian, NEAR)]
     for _ in range(rounds):
         priors = [prior._replace(time=time) for time in TIMES]

@@ -130,7 +130,7 @@ class FreeChoice(Choice):
         """
         spans, logs = [], list[Any]()
         for word in free or ():
-            # What reads as a span is one: a file of such a name can be given as ./A:B.
+            # What reads as a span is one: a file may be ./A:B.
             try:
                 spans.append(interval(str(word)))
             except ParameterError:

@@ -36,7 +36,7 @@ COARSE = 300  #: Instants compared in the search for a shared part.
 #: leave .003, other motions with a fitting rate 1.3 and more.
 SAME_PATH = 0.1
 
-#: Length of pieces that compare logged velocities with the distance travelled. [s]
+#: Length of pieces that compare velocities with the way. [s]
 TRAVEL = 1.0
 #: Clock rates to try on two logs that do not fit.
 RATES = np.concatenate([np.linspace(0.5, 2.0, 61), [1e-3, 1e3]])
@@ -55,10 +55,9 @@ class Alignment(NamedTuple):
 def align(recording: Recording, free: Recording) -> Alignment:
     """Shift at which `free` passes the recording's joint positions.
 
-    A coarse shift minimises the mean squared position difference over all overlaps of at
-    least `LEAST_OVERLAP`, by FFT on a common even clock. Gauss–Newton, robust against
-    contacts, refines shift and ratio of rates on the logs' clocks. Of a motion's whole
-    periods the shift with most overlap wins.
+    A coarse shift minimises the mean squared position difference by FFT on an even clock.
+    Gauss–Newton, robust against contacts, refines shift and ratio of rates. Of a motion's
+    whole periods the shift with most overlap wins.
     """
     problem, hints = "", (free.robot_hint, recording.robot_hint)
     if free.joints != recording.joints:
@@ -126,10 +125,7 @@ def why_slower(recording: Recording, free: Recording, rate: float) -> str:
 
 
 def pace(recording: Recording) -> float | None:
-    """Distance by velocities over that by positions; None without either.
-
-    1 on a right clock; pieces of `TRAVEL` average the noise of both.
-    """
+    """Distance by velocities over that by positions, 1 on a right clock; or None."""
     if recording.dq is None or "dq" in recording.source.derived:
         return None
     t = recording.t
@@ -143,8 +139,7 @@ def pace(recording: Recording) -> float | None:
 def shared_part(recording: Recording, free: Recording) -> Alignment | None:
     """The shared part of two logs' motions, None if too short.
 
-    At least `LEAST_OVERLAP` of the motion is within `SAME_TRAJECTORY` at the shift.
-    Partners are unbroken stretches of a second or more.
+    `LEAST_OVERLAP` of the motion is within `SAME_TRAJECTORY`, for a second or more.
     """
     t = np.linspace(recording.t[0], recording.t[-1], COARSE)
     q = resample_columns(t, recording.t, recording.q)
@@ -162,7 +157,7 @@ def shared_part(recording: Recording, free: Recording) -> Alignment | None:
 
 
 def apart(t: Array, q: Array, free: Recording) -> Array:
-    """Free run less positions q at times t of its clock, NaN beyond. (T, n) [rad]"""
+    """Free run less q at times t of its clock, NaN beyond. (T, n) [rad]"""
     return resample_columns(t, free.t, free.q, np.nan) - q
 
 
@@ -193,7 +188,7 @@ def uniform(recording: Recording, step: float) -> Array:
 
 
 def best_fit(recording: Recording, free: Recording) -> tuple[float, float]:
-    """Shift [s] and clock rate of the best fit; of equals the longest overlap."""
+    """Shift [s] and clock rate of the best fit, of longest overlap."""
     step = max(recording.median_step, free.median_step)
     offset = free.t[0] - recording.t[0]
     q = uniform(free, step)
@@ -225,10 +220,7 @@ def distance_moving(recording: Recording, free: Recording, shift: float, rate: f
 def refined(
     recording: Recording, free: Recording, shift: float, rate: float
 ) -> tuple[float, float]:
-    """Shift [s] and clock rate, refined on the logs' own clocks.
-
-    Gauss–Newton on q_free(rate·t + shift) = q(t); as they are without information.
-    """
+    """Shift [s] and clock rate by Gauss–Newton on q_free(rate·t + shift) = q(t)."""
     slope = np.gradient(free.q, free.t, axis=0)
     for _ in range(15):
         t = rate * recording.t + shift
@@ -254,8 +246,7 @@ def refined(
 def robust_equations(slopes: Array, distance: Array) -> tuple[Array, Array]:
     """Matrix (k, k) and right side (k,) of a Gauss–Newton step on distances (T, n).
 
-    The slopes are by k unknowns (k, T, n). A joint's weight is by its spread, a sample's
-    by Cauchy's, so that pushes do not pull.
+    Slopes by k unknowns (k, T, n); Cauchy's weights, so that pushes do not pull.
     """
     weighted = slopes / ((robust_sd(distance) + 1e-7) ** 2 + distance**2)
     return (
@@ -267,10 +258,7 @@ def robust_equations(slopes: Array, distance: Array) -> tuple[Array, Array]:
 def aligned_at(
     recording: Recording, free: Recording, shift: float, rate: float, within: Mask | None = None
 ) -> Alignment:
-    """Alignment of two logs at a shift [s] and rate, perhaps `within`. (T,)
-
-    The deviation is infinite for fewer than two samples.
-    """
+    """Alignment of two logs at a shift [s] and rate, perhaps `within`. (T,)"""
     distance = apart(rate * recording.t + shift, recording.q, free)
     overlap = np.isfinite(distance[:, 0])
     if within is not None:

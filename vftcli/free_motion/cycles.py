@@ -20,15 +20,15 @@ LEAST_REPEATED = 0.15  #: Least share of the motion that must be there twice.
 #: A quarter of the positions must return, within this share of their spread.
 RETURNS = 0.015
 
-#: A valley is worth refining if a quarter of the samples come back within this share.
+#: A valley is refined if a quarter of the samples come back so near.
 SHORTLIST = 0.15
 CANDIDATES = 40  #: Valleys looked at, the deepest ones.
 SEARCHED = 0.01  #: Finest clock on which a period is looked for. [s]
 MULTIPLES = 12  #: Multiples of the period that refine it.
-#: How far from a stated period the true one is looked for, relative: clocks drift.
+#: How far from a stated period the true one may be, relative.
 AROUND = 0.03
 ENOUGH = 2560  #: Samples that refine a period: more only take longer.
-#: Spans this many times what the samples fill at their usual step are gaps, not motion.
+#: Spans so many times what the samples usually fill are gaps.
 SPARSE = 10.0
 
 #: How near a sample is to itself one period away. [rad]
@@ -52,12 +52,9 @@ class Period(NamedTuple):
 def find_period(recording: Recording, stated: float | None = None) -> Period:
     """Find the time after which the joint positions return.
 
-    The mean squared distance between the log and itself later (the autocorrelation,
-    corrected for overlap) has a valley at every multiple of the period. The first from
-    which enough samples return is refined below the sample time by Gauss–Newton on all
-    its multiples, robust against contacts that push the arm off its path.
-
-    The search stays within `AROUND` of a stated period. [s]
+    The mean squared distance of the log to itself later has a valley at every multiple of
+    the period. The first from which enough samples return is refined by Gauss–Newton on
+    all its multiples, robust against contacts.
     """
     t, q = moving_part(recording)
     step, duration = recording.median_step, t[-1] - t[0]
@@ -132,7 +129,7 @@ def valleys(x: Array, step: float, stated: float | None) -> list[float]:
     if stated is not None:
         low = max(2, int(np.floor((1.0 - AROUND) * stated / step)))
         high = min(high, int(np.ceil((1.0 + AROUND) * stated / step)) + 1)
-    # None where a clock of bursts spans hardly more than a few of its median steps.
+    # None where a clock of bursts spans few median steps.
     lags = np.arange(low, high)
     before, here, after = distance[lags - 1], distance[lags], distance[lags + 1]
     found = lags[(here <= before) & (here <= after)]
@@ -152,10 +149,7 @@ def returned(t: Array, q: Array, seconds: float, every: int = 1) -> float:
 
 
 def refined_period(t: Array, q: Array, period: float) -> float:
-    """Refine a period below the sample time, on the log's own clock. [s]
-
-    Gauss–Newton on q(t + mP) = q(t), first for m = 1, then for up to `MULTIPLES` in the log.
-    """
+    """A period refined on the log's own clock by Gauss–Newton on q(t + mP) = q(t). [s]"""
     both, n = np.hstack([q, np.gradient(q, t, axis=0)]), q.shape[1]
     last = max(1, int((t[-1] - t[0]) / period - LEAST_REPEATED))
     several = np.unique(np.linspace(1, last, min(last, MULTIPLES)).astype(int))
@@ -167,7 +161,7 @@ def refined_period(t: Array, q: Array, period: float) -> float:
             for m in multiples:
                 inside = here + m * period <= t[-1]
                 there = here[inside] + m * period
-                # Of few times in a long log one search for all columns is faster.
+                # One search for all columns is faster.
                 after = np.minimum(t.searchsorted(there, "right"), len(t) - 1)
                 share = (there - t[after - 1]) / (t[after] - t[after - 1])
                 found = both[after - 1] + share[:, None] * (both[after] - both[after - 1])
@@ -209,9 +203,8 @@ class Cycles(NamedTuple):
 def segment(recording: Recording, period: Period) -> Cycles:
     """The repeated path's begin and end; the log may start amid a cycle.
 
-    A sample is on the path if the arm is at its place one period later or earlier, or if
-    the log holds neither. Contacts push it off for a moment, so the path begins with the
-    first sample after which three quarters of a cycle are on it, and ends alike.
+    A sample is on the path if the arm is there a period later or earlier, or if the log
+    holds neither. Contacts push it off, so three quarters of a cycle must be on it.
     """
     t, q = moving_part(recording)
     seconds = period.seconds
@@ -250,12 +243,12 @@ class FreeCycles(NamedTuple):
     """Cycles assumed free."""
 
     numbers: tuple[int, ...]  #: Counted from 0.
-    #: Each whole cycle's, by the smallest, ∞ in a gap; None of stated cycles. (cycles,)
+    #: Each whole cycle's, ∞ in a gap; None of stated ones. (cycles,)
     residuals: Array | None
 
     @property
     def drawn(self) -> tuple[int, ...]:
-        """Cycles paired with the others: all, or `MOST_PAIRED` from first to last."""
+        """Cycles paired with the others: `MOST_PAIRED` at most."""
         if len(self.numbers) <= MOST_PAIRED:
             return self.numbers
         at = np.linspace(0, len(self.numbers) - 1, MOST_PAIRED).round().astype(int)
@@ -280,8 +273,7 @@ class FreeCycles(NamedTuple):
 def find_free_cycles(motion: Run, cycles: Cycles) -> FreeCycles:
     """The cycle of smallest residual, and those that differ by noise alone.
 
-    A residual is the rms of torque less the model's, low-passed, relative to each joint's
-    smallest, averaged over the joints.
+    By the rms of torque less the model's, low-passed, over each joint's smallest.
     """
     number = cycles.number(motion.t)
     if cycles.whole < 1:
@@ -311,14 +303,12 @@ def find_free_cycles(motion: Run, cycles: Cycles) -> FreeCycles:
 
 
 def residuals(motion: Run, cycles: Cycles) -> Array:
-    """Mean of the joints' residuals over their smallest. (cycles,)
-
-    A cycle of which a gap takes more than half has none: ∞.
-    """
+    """Mean of the joints' residuals over their smallest. (cycles,)"""
     # Below 5 Hz a push exceeds the drives' ripple.
     cutoff = signal_edge(motion.step, 5.0)
     gap = low_pass(motion.t, motion.drive_torque - motion.model_torque, cutoff)
     number = cycles.number(motion.t)
+    # A cycle of which a gap takes more than half has none: ∞.
     held = np.bincount(number[(number >= 0) & (number < cycles.whole)], minlength=cycles.whole)
     square = np.full((cycles.whole, gap.shape[1]), np.inf)
     for cycle in np.flatnonzero(2 * held >= held.max()).tolist():

@@ -60,8 +60,7 @@ def in_gap(clock: Array, times: Array) -> Mask:
 def by_phase(motion: Run, pairing: Pairing) -> Pairing:
     """Move each sample's partner to the nearest place on the free run's path.
 
-    Gauss–Newton minimises the distance of the joints; at rest the clock decides. The shift is
-    smoothed along time.
+    Gauss–Newton minimises the joints' distance; the shift is smoothed along time.
     """
     known, free = pairing.known, pairing.free
     if np.count_nonzero(known) < 8:
@@ -97,7 +96,7 @@ class PairedRuns:
         return self._found[what, cutoff]
 
     def of_free(self, name: str) -> Array:
-        """Mean of a series of `Run` over the free runs at paired instants. (T, n)"""
+        """Mean of a `Run`'s series over the free runs' partners. (T, n)"""
         count, total = np.zeros(1), np.zeros(1)
         for p in self.pairings:
             there = p.there(getattr(p.free, name))
@@ -165,7 +164,7 @@ LEAST_BAND = 12.0
 #: Share of the correction that is wrong even with the best model.
 LEAST_SHARE = 0.05
 PIECE = 0.4  #: Length of pieces that separate noise from slow loads. [s]
-#: Fewest pieces for a noise estimate: a short cycle may hold contact throughout.
+#: Fewest pieces for a noise estimate.
 LEAST_PIECES = 20
 QUIET = 0.1  #: Share of the pieces without a fast contact.
 SEED = 15  #: Of the white noise beside the quietest pieces.
@@ -195,7 +194,7 @@ class ErrorModel(NamedTuple):
 
     @property
     def floor_moving(self) -> Array:
-        """RMS of `sd` in motion; of all samples if mostly at rest. (n,) [N·m]"""
+        """RMS of `sd` in motion, of all if mostly at rest. (n,) [N·m]"""
         return self.rms_moving(self.sd)
 
     def rms_moving(self, x: Array) -> Array:
@@ -210,7 +209,7 @@ class Rung(NamedTuple):
 
     clock: str  #: The pairing it starts from: "commanded" or "found".
     phase: bool  #: Whether partners are the nearest on the joint-space path.
-    corrected: bool  #: Whether the model's torque of the difference is subtracted.
+    corrected: bool  #: Whether the model's torque is subtracted.
     title: str  #: What it does, in words.
 
 
@@ -255,7 +254,7 @@ def differences(
         if rung.clock not in clocks:
             continue
         if pair is None or way != (rung.clock, rung.phase):
-            # One way of pairing after the other: of a long log two have no room at once.
+            # One way after the other: of a long log two have no room.
             pair, way = None, (rung.clock, rung.phase)
             pairings = clocks[rung.clock]
             if rung.phase:
@@ -290,10 +289,7 @@ def difference(pair: PairedRuns, name: str, cutoff: float | None) -> Difference:
 
 
 def most_certain(made: Iterable[Difference]) -> tuple[Difference, list[Remark]]:
-    """The difference of least expected error, and floors of all.
-
-    By the mean over trusted joints of expected error in motion, over the lowest rung's.
-    """
+    """The difference of least expected error of trusted joints in motion; all floors."""
     steps = iter(made)
     chosen = next(steps)
     lowest, least = chosen.error.floor_moving, 1.0
@@ -392,9 +388,8 @@ def noise_when_quiet(
 ) -> Array:
     """Coloured noise of a low-passed difference, from its quiet pieces. (n,) [N·m]
 
-    Of each `PIECE` of x (S, n) it is the deviation from a line, a slow load's course;
-    `QUIET` of them are assumed free. Slower wander does not count: this errs low. Zero
-    for fewer than `LEAST_PIECES`.
+    Of each `PIECE` of x (S, n) the deviation from a line, a slow load's course; `QUIET` of
+    them are assumed free. Slower wander does not count: this errs low.
     """
     size = round(PIECE / step)
     count = len(t) // size
@@ -412,7 +407,7 @@ def noise_when_quiet(
 
 
 def off_line(x: Array, size: int) -> Array:
-    """Mean square deviation from a line in pieces of so many samples. (pieces, n)"""
+    """Mean square deviation from a line in pieces of a size. (pieces, n)"""
     count = len(x) // size
     pieces = x[: count * size].reshape(count, size, -1)
     along = np.linspace(-1.0, 1.0, size)

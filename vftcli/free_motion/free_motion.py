@@ -124,7 +124,7 @@ class FreeMotion(Shown):
 
     @property
     def steadied(self) -> "FreeMotion":
-        """The motion without samples that stand alone; itself where there are none."""
+        """The motion without samples that stand alone, if any."""
         log = self.log.steadied
         if log is self.log and all(run.run is run.run.steadied for run in self.runs):
             return self
@@ -139,7 +139,7 @@ class FreeMotion(Shown):
 
     @cached_property
     def cycles_given(self) -> tuple[int, ...]:
-        """Cycles that you name free, from 0: named, or whole inside a free span."""
+        """Cycles that you name free, or inside a free span, from 0."""
         cycles, whole = self.cycles, self.cycles.whole
         for number in self.choice.cycles:
             if not 1 <= number <= whole:
@@ -253,20 +253,14 @@ class FreeLoad:
         return handed_over(load_regressor(run.robot.chain, run.q) @ self.weights)
 
     def wrench(self, chain: Chain, q: Array) -> tuple[Array, Array]:
-        """Wrench of its weight at q (N, n) [rad], and covariance. (N, 6), (N, 6, 6)
-
-        In base axes, the moment about the flange point. [N, N·m]
-        """
+        """Base-axes wrench of its weight at q (N, n) about the flange; covariance. (N, 6)"""
         each = load_wrench(chain, q)
         spread = each * np.concatenate([[self.sd], self.moment_sd])
         return each @ self.weights, spread @ spread.swapaxes(1, 2)
 
 
 def without_load(run: Run, load: FreeLoad | None) -> Run:
-    """A run whose model carries a load; itself without one.
-
-    By its weight alone every start and stop would look like a push.
-    """
+    """A run whose model carries a load; itself without one."""
     return run if load is None else with_point_mass(run, load.weights)
 
 
@@ -275,6 +269,7 @@ def with_point_mass(run: Run, weights: Array) -> Run:
     body = Payload(mass=float(weights[0]), com=weights[1:] / weights[0])
     chain, terms = run.robot.loaded_chain, run.terms
     arms = (momentum_terms(each, run.q, run.dq) for each in (chain.with_payload(body), chain))
+    # By its weight alone every start and stop would look like a push.
     p, coriolis, gravity = map(np.subtract, *arms)
     p, mu = map(handed_over, (terms.p + p, terms.mu + coriolis - gravity))
     return run.holding(terms=replace(terms, p=p, mu=mu))
@@ -293,7 +288,7 @@ def free_load(pieces: Sequence[RunSamples]) -> FreeLoad | None:
     prior = np.concatenate([WIDE, 0.2 * friction + 0.05, 0.15 * friction + 0.02])
     weights, sd, loaded = weigh(d, A, prior)
     _, _, bare = weigh(d, A[:, :, 4:], prior[4:])
-    moved = bare > 0.0  # a simulation without noise leaves nothing on a joint at rest
+    moved = bare > 0.0  # a simulation may leave nothing on a joint at rest
     share = root_mean_square(loaded[moved] / bare[moved])
     mass = float(weights[0])
     if mass < max(LEAST, SURE * sd[0]) or share > PARTLY:
@@ -309,10 +304,7 @@ def free_load(pieces: Sequence[RunSamples]) -> FreeLoad | None:
 
 
 def columns(piece: RunSamples) -> tuple[Indices, Array, Array] | None:
-    """The weighed samples, their disturbance and its columns; None of a short piece.
-
-    (S,), (S, n) [N·m], (S, n, 4 + 2n)
-    """
+    """Samples (S,), their disturbance (S, n) [N·m], columns (S, n, 4 + 2n); or None."""
     run, inside = piece.run, np.flatnonzero(piece.inside)
     if inside.size == 0:
         return None

@@ -26,7 +26,7 @@ from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.remarks import Remark, Where, caution, fact, on_joints
 from vftcli.signals.rest import REST, faster
 
-BLOCK = 1.0  #: Length of pieces: their scatter separates chance from change. [s]
+BLOCK = 1.0  #: Length of pieces whose scatter shows chance. [s]
 #: Standard errors of a change that is believed.
 SURE = 3.0
 
@@ -34,9 +34,8 @@ SURE = 3.0
 def two_cycle_reference(motion: FreeMotion) -> ExternalTorque:
     """The two-cycle difference of a log and its free motion, with its own error.
 
-    Where position and velocity repeat, gravity, inertia and friction cancel: the rest is
-    the external torque (Sec. IV-A of the paper; sign of (18)). The free run is other logs
-    of the motion, or cycles of this log; a single one then has no reference of its own.
+    Where position and velocity repeat, all but the external torque cancels (Sec. IV-A of
+    the paper; sign of (18)). A single free cycle has no reference of its own.
     """
     log, choice = motion.log, motion.choice
     clocks, remarks = partners_in_logs(motion) if motion.runs else partners_in_log(motion)
@@ -52,7 +51,7 @@ def two_cycle_reference(motion: FreeMotion) -> ExternalTorque:
     measured = measured_scale(motion, clocks["found"], chosen)
     scale = np.ones(log.robot.joints) if measured is None else measured
     moving = np.isfinite(chosen.tau) & ~chosen.error.standing
-    # Cycles of one log lie too close in time for friction to change between them.
+    # Between cycles of one log friction has no time to change.
     change = friction_change(log, chosen.tau, moving) if motion.runs else np.zeros(len(scale))
     # Friction changes in motion, in which the scale was measured too.
     wider = np.hypot(chosen.error.sd * scale, change)
@@ -150,22 +149,19 @@ def measured_scale(
 
 
 def error_ratio(found: Difference, where: Mask) -> Array:
-    """RMS of a zero difference over its expected error. (n,)
-
-    Held between 0.3 and 3: beyond, the error model is not the cause.
-    """
+    """RMS of a zero difference over its expected error. (n,)"""
     moving = ~found.error.standing[where]
     expected = rms(found.error.sd[where], moving)
     shown = rms(found.tau[where], moving)
+    # Beyond these limits the error model is not the cause.
     return np.clip(shown / np.maximum(expected, 1e-12), 0.3, 3.0)
 
 
 def friction_change(motion: Run, tau: Array, moving: Mask) -> Array:
     """Change of dry friction since the free run, 0 if maybe chance. (n,) [N·m]
 
-    Joints warm up between two logs. The change is the mean of the difference (T, n) [N·m]
-    times the sign of the velocity, which contacts do not follow; its scatter over pieces
-    of `BLOCK` is its uncertainty.
+    The mean of the difference (T, n) [N·m] times the velocity's sign, which contacts do not
+    follow; its scatter over pieces of `BLOCK` is its uncertainty.
     """
     t, n = motion.t, tau.shape[1]
     piece = ((t - t[0]) / BLOCK).astype(np.int64)

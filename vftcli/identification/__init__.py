@@ -12,7 +12,7 @@ from vftcli.signals.option import Choice, Option, interval, is_yes
 class Task(Choice):
     """Method and settings of an identification."""
 
-    #: None: friction, or base without the arm's own links; gains are `observers.tuning`'s.
+    #: None: friction, or base if the links are not the arm's.
     method: Annotated[
         str | None,
         Option(

@@ -20,12 +20,11 @@ from vftcli.signals.rest import SLIDES, slower
 TOUCH = 7.0  #: Residual of a contact, in robust SDs.
 TOUCH_TIME = 0.15  #: Time it must last. [s]
 TOUCH_MARGIN = 0.3  #: Time left out before and after. [s]
-#: Least share of the torque's variation that profile links and friction explain in heavy
-#: joints; 0.99 or more with the right robot.
+#: Least share of heavy joints' torque that the profile explains; .99 with the right robot.
 WRONG = 0.95
 LOAD_EXPLAINS = 0.8  #: Least share of the misfit that a load explains.
 UNKNOWN_LOAD = 0.5  #: Smallest suspected load. [kg]
-#: Least variation of a heavy joint's gravity torque, as a share of the largest.
+#: Least variation of a heavy joint's gravity torque, by the largest.
 HEAVY = 0.1
 #: Least ratio of the profile's rest to free links' for another arm: right links leave 1.0 to
 #: 2.5 if friction or contact hide the torque, wrong ones 4 to 12.
@@ -45,10 +44,7 @@ class CleanFit(NamedTuple):
 
 
 def fit_without_contacts(data: Training, strict: bool) -> CleanFit:
-    """Friction fitted twice, the second time without contacts.
-
-    If it is `strict`, torque that other links alone explain is refused.
-    """
+    """Friction fitted twice, the second time without contacts."""
     fits, remarks = fit_frictions(data), list[Remark]()
     logs = list(data.logs)
     for k, (log, residual) in enumerate(zip(data.logs, all_residuals(data, fits), strict=True)):
@@ -72,6 +68,7 @@ def fit_without_contacts(data: Training, strict: bool) -> CleanFit:
         fits = fit_frictions(data)
     remarks += warm_up_remarks(data, fits)
     doubts = list(model_doubts(data, fits))
+    # Torque that other links alone explain is refused.
     if strict and any(doubt.code == "unexplained-torque" for doubt in doubts):
         ratio = links_explain(data, fits).max(initial=0.0)
         if ratio > OTHER_LINKS:
@@ -99,14 +96,12 @@ class ContactSpan(NamedTuple):
 
 
 def find_contacts(motion: PreparedLog, residual: Array, dry: Array) -> list[ContactSpan]:
-    """Stretches with a large residual (M, n), neighbours joined. [N·m]
-
-    Near a reversal a joint may stick: only torque above dry friction (M, n) counts.
-    """
+    """Stretches with a large residual (M, n), neighbours joined. [N·m]"""
     t, usable = motion.t, motion.weights > 0
     sd = np.array([robust_sd(r[u]) for r, u in zip(residual.T, usable.T, strict=True)])
     # The filter spreads an event at rest over a period of its cutoff.
     reach = max(1, round(1.0 / (motion.cutoff * median_step(t))))
+    # Near a reversal a joint may stick: only torque above dry friction counts.
     excess = abs(residual) - abs(dry) * near(slower(motion.dq, SLIDES), reach)
     z = excess * usable / np.maximum(sd, 1e-9)
     touched = covered(intervals(t, z.max(axis=1) > TOUCH, least=TOUCH_TIME), len(t))
@@ -128,10 +123,7 @@ def fitted_dry_friction(log: PreparedLog, fits: Mapping[int, JointFit]) -> Array
 
 
 def links_explain(data: Training, fits: Mapping[int, JointFit]) -> Array:
-    """Rest of the profile's links over free ones', heavy joints. (h,) [1]
-
-    All inertial parameters are free, physical or not; the friction's structure is fixed.
-    """
+    """Rest of the profile's links over free ones', also unphysical, heavy joints. (h,)"""
     joints = range(data.robot.joints)
     shapes = tuple(fits[j].shape if j in fits else Shape(()) for j in joints)
     layout = ParameterColumns(data.robot.chain, data.rotor, shapes)

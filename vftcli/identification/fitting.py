@@ -73,7 +73,7 @@ class Trace(NamedTuple):
 
     motion: PreparedLog  #: The prepared log.
     role: str  #: "train" or "held-out".
-    measured: Array  #: Drive torque, by the identified drive constants. (M, n) [N·m]
+    measured: Array  #: Drive torque, by the new constants. (M, n) [N·m]
     predicted: Array  #: Torque that the identified robot expects. (M, n) [N·m]
     before: Array  #: RMS that the profile leaves. (n,) [N·m]
 
@@ -154,13 +154,11 @@ def score_remarks(traces: Sequence[Trace]) -> Iterator[Remark]:
 
 
 def held_out_remarks(trace: Trace, trained: Array) -> Iterator[Remark]:
-    """Causes of a held-out residual far above the training's. (n,) [N·m]
-
-    A load on the flange, which explains all joints at once, is tried first.
-    """
+    """Causes of a held-out residual far above the training's. (n,) [N·m]"""
     motion, worse = trace.motion, trace.rms > WORSE * trained
     if not worse.any():
         return
+    # A load on the flange explains all joints at once.
     mass, explained = apparent_load(motion, trace.residual)
     if explained > EXPLAINS and abs(mass) > HEAVY:
         share = 100.0 * explained
@@ -176,8 +174,7 @@ def held_out_remarks(trace: Trace, trained: Array) -> Iterator[Remark]:
 def joint_remark(trace: Trace, j: int, trained: float) -> Remark:
     """Whether friction explains joint j's (from 0) residual beyond training's.
 
-    Coulomb and viscous friction and an offset are fitted to the residual; if they explain
-    `EXPLAINS` of it, friction is the cause.
+    Coulomb and viscous friction and an offset must explain `EXPLAINS` of it.
     """
     motion, residual, size = trace.motion, trace.residual, trace.rms[j]
     where = on_joints([j], motion.recording.name)
@@ -198,10 +195,7 @@ def joint_remark(trace: Trace, j: int, trained: float) -> Remark:
 
 
 def repeated_share(train: PreparedLog, test: PreparedLog) -> float:
-    """Share of the test's moving samples on the training log's (q, q̇) path.
-
-    Such a log is no test: the model has fitted its errors on that path.
-    """
+    """Share of the test's moving samples on the training's path: they are no test."""
     from scipy.spatial import cKDTree
 
     if train.samples == 0 or test.samples == 0:

@@ -45,16 +45,15 @@ NEVER_NEGATIVE = ("coulomb", "presliding", "load_coulomb", "stribeck")
 #: Terms bounded at zero if no candidate of a joint is friction.
 BOUNDED = ("coulomb", "viscous")
 
-#: Velocities are reversed if both terms push, the bound leaves this many times the power, and
-#: by more than this share of the joint's largest torque: a right model's error pushes by up
-#: to .7 % of it; friction is 2 % (a Panda's wrist) to 20 % (a UR's).
+#: Velocities are reversed if both terms push by so many times the power, and this share of
+#: the largest torque: a right model's error is .7 % of it, friction 2 % (Panda) to 20 % (UR).
 TURNED, PUSH = 2.0, 0.02
 
 SLIDING = 3e-3  #: Smoothing of the sign beside presliding. [rad/s]
 #: Observers of 3 … 10 1/s pass .5 … 1.6 Hz. [Hz]
 LISTENING = 2.0
 MARGIN = 1.01  #: A simpler model wins within this factor of the best error.
-#: A shorter presliding length wins within this factor of the best, none over all.
+#: A shorter presliding length wins within this factor of the best.
 LENGTH_MARGIN = 1.02
 LIGHT = 1.0  #: Least spread of gravity torque that shows growth with load. [N·m]
 #: Share of a fit's error below which the profile's friction stays.
@@ -76,8 +75,7 @@ class JointData(NamedTuple):
 
     joint: int  #: Joint, from 0.
     y: Array  #: Torque of friction and rotor. (M,) [N·m]
-    #: Columns beside friction: q̈ for an unknown rotor inertia, the rigid-body torque for
-    #: an unknown drive constant. (M, f)
+    #: q̈ for an unknown rotor inertia, rigid torque for an unknown drive constant. (M, f)
     fixed: Array
     weights: Array  #: 0 for empty samples, 1 elsewhere. (M,)
     logs: Sequence[PreparedLog]  #: The logs.
@@ -124,13 +122,12 @@ class JointFit(NamedTuple):
     """Friction of one joint and the numbers fitted beside it."""
 
     shape: Shape  #: The chosen structure.
-    fit: ColumnFit  #: Friction coefficients, then q̈'s, then the rigid torque's.
-    #: Candidate → RMS missed of stretches left out; empty without competition. [N·m]
+    fit: ColumnFit  #: Coefficients of friction, q̈, rigid torque.
+    #: Candidate → RMS missed of stretches left out. [N·m]
     scores: dict[Shape, float]
     constant: bool  #: Whether the drive constant was fitted too.
     presliding: PreslidingScore  #: The presliding length of all joints.
-    #: RMS missed by the model, and by the profile's numbers, in stretches left out;
-    #: NaN if not compared. [N·m]
+    #: RMS missed by the model and by the profile in stretches left out, or NaN. [N·m]
     errors: tuple[float, float] = (np.nan, np.nan)
 
     @property
@@ -179,8 +176,7 @@ def fit_joint(data: Training, j: int, presliding: PreslidingScore, constant: boo
 def data_of_joint(data: Training, j: int, constant: bool) -> JointData:
     """The equations of joint j (from 0) over all logs.
 
-    For an unknown drive constant the rigid body's torque is a column, its coefficient 1 with
-    the profile's right constant. Else it is subtracted.
+    For an unknown drive constant the rigid body's torque is a column, else subtracted.
     """
     names = ("tau", "rigid", "ddq", "weights", "load", "predicted")
     torque, rigid, ddq, weights, load, predicted = (data.joined(name)[:, j] for name in names)
@@ -276,10 +272,7 @@ def choose_shape(data: JointData, length: float = 0.0) -> tuple[Shape, dict[Shap
 
 
 def candidate_shapes(best: Shape, data: JointData, speed: float = 0.0) -> list[Shape]:
-    """A joint's competing shapes up to its highest speed. [rad/s]
-
-    Smoothing, bend and presliding length are those of `best`.
-    """
+    """A joint's competing shapes up to its highest speed [rad/s], else as `best`."""
     shapes, line = list[Shape](), bent(speed)
     points = [(*line.terms, *more) for more in BESIDE_POINTS] if line else []
     for terms in (*CANDIDATES, *points):
@@ -298,7 +291,7 @@ def candidate_shapes(best: Shape, data: JointData, speed: float = 0.0) -> list[S
 
 
 def tellable_terms(terms: tuple[str, ...], data: JointData) -> tuple[str, ...]:
-    """Terms that the motion shows: no growth without load, no offset one-way."""
+    """Terms that the motion shows: by load, and both ways."""
     out = tuple(t for t in terms if t != "load_coulomb" or data.load_spread >= LIGHT)
     return out if data.reverses else tuple(t for t in out if t != "offset")
 
@@ -331,12 +324,10 @@ def bounded_shape(shape: Shape, data: JointData) -> tuple[Shape, bool]:
 
 
 def non_negative_fit(shape: Shape, data: JointData) -> tuple[Shape, Array]:
-    """A shape's fit; with presliding, without negative dry terms.
-
-    The two share one dry torque: too much of one excludes the other.
-    """
+    """A shape's fit; with presliding, without negative dry terms."""
     fit = data.fit(shape)
     pushing = pushing_terms(shape, fit.values)
+    # The two share one dry torque: too much of one excludes the other.
     if "presliding" in shape.terms and pushing:
         shape = shape._replace(terms=tuple(t for t in shape.terms if t not in pushing))
         fit = data.fit(shape)

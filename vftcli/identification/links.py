@@ -33,19 +33,18 @@ REWEIGHTINGS = 3  #: Passes of reweighting.
 #: Singular values below this share of the largest stay at the start.
 TRUNCATION = 1e-3
 PROBES = 400  #: Random states for the structure of base parameters.
-#: Diagonal entries of R below this share of the largest are zero: rounding is at 1e-15.
+#: Entries of R's diagonal below this share of the largest are zero.
 RANK_TOLERANCE = 1e-8
 #: Least relative deviation of an undetermined parameter.
 DOUBTFUL = 0.3
 #: Weights of the distance to the profile, the weakest pull first.
 WEIGHTS = (1e-2, 1e-1, 1.0, 1e1, 1e2, 1e3, 1e4)
-MARGIN = 1.01  #: Factor of the least misfit within which a pull counts as good.
+MARGIN = 1.01  #: A pull is good within this factor of the best.
 #: Pull of a maker's table with masses of 5 % SD: the distance of
 #: P = (1 + δ) P₀ is 2 δ² for small δ.
 TABLE = 100.0
 STEPS = 100  #: Newton steps at most; a dozen or two are usual.
-#: Decrement at which Newton's method stops: the cost is a log-likelihood, 1 is one standard
-#: deviation of one parameter.
+#: Decrement at which Newton's method stops: 1 is one SD of one parameter.
 SETTLED = 1e-3
 #: Least thickness of a profile's link, for a finite distance to it. [m]
 SMALLEST_RADIUS = 1e-3
@@ -82,10 +81,7 @@ def residuals(layout: ParameterColumns, log: PreparedLog, x: Array) -> Array:
 
 
 def stack(layout: ParameterColumns, logs: Sequence[PreparedLog], start: Array) -> Triangles:
-    """All logs weighed and stacked; the last solution weighs outliers down.
-
-    The first one is the profile's with fitted friction, `start`. (size,)
-    """
+    """Logs stacked; the last solution, at first `start`, weighs outliers."""
     rows = sum(np.count_nonzero(log.weights) for log in logs)
     if rows < 4 * layout.size:
         raise IdentificationError(
@@ -104,12 +100,10 @@ def stack(layout: ParameterColumns, logs: Sequence[PreparedLog], start: Array) -
 def triangulate(
     layout: ParameterColumns, logs: Sequence[PreparedLog], left: Sequence[Array]
 ) -> Triangles:
-    """QR updates over all chunks of all logs, a triangle per stretch.
-
-    Joints are weighed by the robust deviation of their residual.
-    """
+    """QR updates over all chunks of all logs, a triangle per stretch."""
     weights = np.concatenate([log.weights for log in logs])
     pairs = zip(np.concatenate(left).T, weights.T, strict=True)
+    # Joints are weighed by the robust deviation of their residual.
     sigma = np.array([max(robust_sd(r[w > 0]), 1e-9) for r, w in pairs])
     parts, correlation = [np.zeros((0, layout.size + 1))] * FOLDS, []
     for log, residual in zip(logs, left, strict=True):
@@ -128,10 +122,7 @@ def triangulate(
 
 
 def truncated_step(R: Array, rest: Array) -> tuple[Array, Array, Array]:
-    """Least squares R x ≈ rest in directions with data (truncated SVD).
-
-    Step, SD for unit equations, share in directions without data. (k,) each
-    """
+    """Least squares R x ≈ rest by truncated SVD: step, SD, share without data. (k,)"""
     scale = np.linalg.norm(R, axis=0)
     scale[scale == 0.0] = 1.0
     U, S, Vt = np.linalg.svd(R / scale, full_matrices=False)
@@ -146,7 +137,7 @@ class Grouping(NamedTuple):
 
     independent: tuple[int, ...]  #: Places of the independent unknowns. (b,)
     dependent: tuple[int, ...]  #: Places of the others. (d,)
-    carried: Array  #: β: each independent unknown's share of a dependent one. (b, d)
+    carried: Array  #: β: shares of the dependent ones. (b, d)
 
     def values(self, x: Array) -> Array:
         """Base parameters of a full parameter vector: x₁ + β x₂. (b,)"""
@@ -191,10 +182,7 @@ def group_parameters(layout: ParameterColumns) -> Grouping:
 
 
 def base_parameters(triangles: Triangles, start: Array) -> pl.DataFrame:
-    """Base parameters by weighted least squares, as rows of `BASE`.
-
-    Directions without data keep the start; parameters mostly in them have infinite sd.
-    """
+    """Base parameters by weighted least squares, infinite sd without data; `BASE`."""
     layout = triangles.layout
     grouping, (R, z) = group_parameters(layout), triangles.joined()
     R, before = R[:, grouping.independent], grouping.values(start)
@@ -218,7 +206,7 @@ def pseudo_inertias(phi: Array) -> Array:
     return P
 
 
-BASIS = pseudo_inertias(np.eye(LINK))  #: ∂P/∂φ_k by each of a link's parameters. (10, 4, 4)
+BASIS = pseudo_inertias(np.eye(LINK))  #: ∂P/∂φ_k of one link. (10, 4, 4)
 
 
 def is_physical(phi: Array) -> bool:
@@ -231,10 +219,8 @@ def is_physical(phi: Array) -> bool:
 
 
 def thicken_links(phi: Array) -> Array:
-    """The nearest parameters with mass and thickness in every link. (10n,)
-
-    Rounded tables and point masses touch the edge of what is physical.
-    """
+    """The nearest parameters with mass and thickness in every link. (10n,)"""
+    # Rounded tables and point masses touch the edge of what is physical.
     out = phi.reshape(-1, LINK).copy()
     for row in out:
         mass = row[0] = max(row[0], 1e-3)

@@ -140,8 +140,7 @@ def friction_method(data: Training, fitted: CleanFit | None = None) -> MethodRes
 def by_constant(data: Training, j: int, values: Array, sd: Array) -> tuple[Array, Array, Number]:
     """Coefficients of joint j (from 0), sd by its last drive constant, and this.
 
-    Torque is K i. If the rigid body's comes out as scale times its model, the true K is
-    K / scale, and so are all coefficients.
+    Torque is K i: a rigid torque at `scale` means K / scale, and so all coefficients.
     """
     scale, scale_sd = values[-1], sd[-1]
     if scale <= LEAST_SLOPE:
@@ -156,10 +155,7 @@ def by_constant(data: Training, j: int, values: Array, sd: Array) -> tuple[Array
 
 
 def rotor_number(j: int, value: float, sd: float, before: float) -> tuple[Number, list[Remark]]:
-    """Rotor inertia of joint j (from 0) [kg·m²], remarks if not known.
-
-    Also determined if `REFUTED` sd off the profile's.
-    """
+    """Rotor inertia of joint j (from 0) [kg·m²], a remark if open or refuted."""
     if refuted := abs(value - before) >= REFUTED * sd:
         value = max(value, 0.0)
     known = value > 0 and sd < DETERMINED * value
@@ -261,13 +257,11 @@ MATTERS = 0.02
 
 
 def whole_arm(data: Training) -> MethodResult:
-    """Base parameters by weighted least squares, robot of nearest physical links.
-
-    Friction models are chosen twice, so that an error of the profile's links is no friction.
-    """
+    """Base parameters by weighted least squares, robot of nearest physical links."""
     data, fits, remarks = fit_without_contacts(data, strict=False)
     layout, start = initial_columns(data, fits)
     x = nearest_physical_links(stack(layout, data.logs, start), start)
+    # Friction is chosen anew, without the error of the profile's links.
     refined = with_vector(data.robot, layout, x, data.robot.friction)
     data = data._replace(logs=tuple(log.with_robot(refined) for log in data.logs))
     fits = fit_frictions(data)
@@ -337,8 +331,7 @@ def with_vector(
 def chosen_method(data: Training) -> MethodResult:
     """Result of "friction", or of "base" if the profile's links are not the arm's.
 
-    Links are freed if their rest is `OTHER_LINKS` times that of free ones, the logs show them,
-    and nothing suggests a load.
+    Links are freed if the profile's leave `OTHER_LINKS` times the rest, and no load shows.
     """
     fitted = fit_without_contacts(data, strict=True)
     kept = friction_method(data, fitted)

@@ -78,7 +78,7 @@ class LoadFit(NamedTuple):
     origin: Remark  #: Its source and method.
 
     def carried_by(self, recording: Recording) -> bool:
-        """Whether a log carries it, compared as objects: names may be equal."""
+        """Whether a log carries it, as an object: names may be equal."""
         return any(log is recording for log in self.loaded)
 
 
@@ -135,18 +135,15 @@ class JointsFit(NamedTuple):
         return covariance * len(clusters) / (len(clusters) - 1)
 
     def motion_covariance(self, y: Array, gain: float) -> Array:
-        """Covariance of x of a motion, by `STRETCHES` and drives. (k, k)
-
-        Friction of another temperature outlasts residuals: as long as a motion goes one way.
-        """
+        """Covariance of x of a motion, by `STRETCHES` and drives. (k, k)"""
+        # Friction of another temperature lasts as long as a motion goes one way.
         stretches = folds(len(self.A), STRETCHES)
         return self.cluster_covariance(stretches) + self.gain_covariance(y, gain)
 
     def gain_covariance(self, y: Array, gain: float) -> Array:
         """Covariance of x by drive constants of a relative deviation. (k, k)
 
-        Half of their variance belongs to all joints (gear, warmth) and scales the mass; half to
-        each one. The torque y (N, n) is the explained one.
+        Half of their variance belongs to all joints (gear, warmth), half to each one.
         """
         # Each joint's torque adds its part to the solution.
         shares = np.einsum("knp,kn->np", self.A, y * self.weights) @ self.inverse
@@ -168,10 +165,7 @@ def fit_all_joints(A: Array, y: Array, usable: Array) -> JointsFit:
 
 
 def payload_from_pair(first: Recording, second: Recording, robot: Robot) -> LoadFit:
-    """A load from one motion with and without it, in either order.
-
-    At equal phase the torque differs by the load and by friction that grows with it.
-    """
+    """A load from one motion with and without it, in either order."""
     for loaded, free in ((second, first), (first, second)):
         motion, t = prepare(loaded, robot), free.t
         shift, distance = find_time_shift(motion, free)
@@ -258,7 +252,7 @@ def payload_from_poses(recordings: Sequence[Recording], robot: Robot) -> LoadFit
     logs = np.split(np.arange(len(q)), np.cumsum(counts)[:-1])
     if len(logs) > 1:
         covariance += fit.cluster_covariance(logs)
-    else:  # links' errors pass for a load: usual ones, or as what is left shows
+    else:  # links' errors pass for a load
         links = (fit.weights[..., None] * usual_errors(robot.chain, q)).reshape(extra.size, -1)
         by_links, rest, *_ = np.linalg.lstsq(fit.A.reshape(-1, STATIC), links)
         share = ((fit.left * fit.weights) ** 2).sum() / (rest.sum() or np.inf)
@@ -290,8 +284,7 @@ def resting_poses(recording: Recording, robot: Robot) -> tuple[Array, Array]:
 def payload_from_motion(recordings: Sequence[Recording], robot: Robot) -> LoadFit:
     """A load from motion, by torque beyond the robot's own weight.
 
-    The columns of `vftcli.free_motion.free_motion` hold only a load's weight. A second weighing
-    carries the load found, so that its inertia is no weight.
+    A second weighing carries the load found, so that its inertia is no weight.
     """
     names = names_of(recordings)
     q = np.concatenate([recording.q for recording in recordings])
@@ -364,7 +357,7 @@ def find_load(logs: Sequence[Recording], robot: Robot, free: Recording | None) -
                 f"{free.name}, given as free of load, is the heavier one; swap the two logs"
             )
         return fit
-    # A pair repeats a motion: in both logs a joint moves. Episodes carry one load.
+    # A pair repeats a motion. Episodes carry one load.
     moved = all(np.ptp(r.q, axis=0).max() > 0.05 for r in logs)
     if len(logs) == 2 and moved and not all(r.source.part for r in logs):
         # Two different motions with the load may still show it.

@@ -38,11 +38,10 @@ POINT = "point"  #: Head of a bent line's terms, as point1.
 class Shape(NamedTuple):
     """The structure of one joint's friction: terms and nonlinear numbers."""
 
-    #: Keys of coefficients in the robot file, in order; those that begin with `POINT` are the
-    #: torques of a bent line.
+    #: Coefficients' keys in the robot file; with `POINT` a bent line's.
     terms: tuple[str, ...]
     smoothing: float = SMOOTHING  #: Velocity over which the sign is smoothed. [rad/s]
-    stribeck_velocity: float = 0.05  #: Velocity over which the Stribeck term fades. [rad/s]
+    stribeck_velocity: float = 0.05  #: Where the Stribeck term fades. [rad/s]
     #: Velocity from which the logarithmic term flattens. [rad/s]
     logarithmic_velocity: float = 1.0
     #: Way over which the gear's teeth give before they slide. [rad]
@@ -58,7 +57,7 @@ class Shape(NamedTuple):
 
     @property
     def points(self) -> tuple[str, ...]:
-        """The terms that are torques of a bent line, in the order of its speeds."""
+        """The terms of a bent line, in the order of its speeds."""
         return tuple(term for term in self.terms if term.startswith(POINT))
 
     @property
@@ -98,8 +97,7 @@ class Shape(NamedTuple):
 def bent(speed: float) -> Shape | None:
     """The bent line up to a speed [rad/s], None of fewer than two points.
 
-    Between its points the line is straight: a motion well beyond one shows the next one too;
-    behind its last point it continues.
+    A motion well beyond a point shows the next one too; the last stretch continues.
     """
     reached = [speed >= low + SPANNED * (high - low) for low, high in itertools.pairwise(BENDS)]
     count = 1 + [*reached, False].index(False)

@@ -48,11 +48,11 @@ WRITTEN = tuple(
     Shape(("coulomb", "logarithmic"), logarithmic_velocity=bend)
     for bend in LOGARITHMIC_VELOCITIES
 )
-UNASKED = 0.5  #: Least share of motion with a target velocity, else a hand led.
+UNASKED = 0.5  #: Least share of motion with a target velocity.
 #: Most of the law in a joint's friction under a guiding hand; programs feed .8 to 1.3 of it
 #: forward, by temperature and load.
 GUIDED = 0.4
-SPEEDS = (0.0, 0.05, 0.1, 0.2)  #: Lowest speeds of samples, which must agree too. [rad/s]
+SPEEDS = (0.0, 0.05, 0.1, 0.2)  #: Lowest speeds that must agree too. [rad/s]
 SETTLE = 0.1  #: Cut at both ends of a rest. [s]
 STEADY = 5e-3  #: Largest relative change of the target current in a rest.
 
@@ -217,13 +217,11 @@ def constant_in_motion(j: int, log: ControllerTargets) -> Estimate:
 
 
 def rotor_inertia(j: int, log: ControllerTargets) -> Estimate:
-    """J from the moment beyond the rigid body.
-
-    y = J q̈ + s g + c + δ·dy/dt: s separates 9.82 from 9.81 m/s², δ shifts time.
-    """
+    """J from the moment beyond the rigid body."""
     ddq, gravity, lead, y = (
         signal[:, j] for signal in (log.ddq, log.gravity, log.lead, log.moment - log.rigid)
     )
+    # y = J q̈ + s g + c + δ·dy/dt: s separates 9.82 from 9.81 m/s², δ shifts time.
     A = np.column_stack([ddq, gravity, np.ones(len(y)), lead])
     if ddq.std() < 1e-2:
         return UNKNOWN
@@ -236,8 +234,7 @@ def rotor_inertia(j: int, log: ControllerTargets) -> Estimate:
 def controller_friction(j: int, log: ControllerTargets, constant: float) -> FrictionLaw | None:
     """Best shape of K·target_current − target_moment, coefficients, sd.
 
-    The controller's own law is a bent line, used where the motion spans its points, else a
-    logarithm. None at rest.
+    A bent line where the motion spans its points, else a logarithm. None at rest.
     """
     speed = abs(log.dq[:, j])
     fast = np.quantile(speed, 0.9)
@@ -260,8 +257,7 @@ def controller_friction(j: int, log: ControllerTargets, constant: float) -> Fric
 def refuse_guided(recording: Recording, log: ControllerTargets, robot: Robot) -> None:
     """Raise if a hand led the arm: the controller then uses less friction.
 
-    Logged target velocities are then zero while the arm moves. Without them the friction fed
-    forward is a fraction of the law, .1 to 1.1 by joint: one joint far below shows the hand.
+    Target velocities are then zero, or a joint's friction fed forward is far below the law.
     """
     share, least = 1.0, UNASKED
     if recording.target_dq is not None:

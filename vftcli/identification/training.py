@@ -30,7 +30,7 @@ CUTOFF = 8.0
 #: Samples kept per period of the cutoff when the filtered log is decimated.
 OVERSAMPLING = 6.0
 STOP = 0.3  #: Length of a stop that identifies nothing, by stiction. [s]
-STATIC = 4  #: Parameters of a link that gravity shows: mass, three first moments.
+STATIC = 4  #: A link's parameters that gravity shows.
 GAP = 10.0  #: Steps longer than this many median steps are left out.
 
 
@@ -69,8 +69,7 @@ class PreparedLog:
     dq: Array  #: Velocities. (M, n) [rad/s]
     ddq: Array  #: Accelerations. (M, n) [rad/s²]
     tau: Array  #: Drive torque, friction included. (M, n) [N·m]
-    #: Weight of every sample and joint, 0 in the joint's long stops, in gaps of the clock, in
-    #: a contact. (M, n)
+    #: Weights, 0 in a joint's long stops, in gaps, in a contact. (M, n)
     weights: Array
     #: Friction columns that were made for this robot. (M,) each
     columns: dict[tuple[str, int, tuple[float, ...]], Array] = field(default_factory=dict)
@@ -269,7 +268,7 @@ class Training(NamedTuple):
 
     @property
     def rotor(self) -> bool:
-        """Whether torque is measured before the gear and accelerates the rotor too."""
+        """Whether torque accelerates the rotor too, before the gear."""
         return self.robot.torque_source != "link_torque"
 
     def joined(self, name: str) -> Array:

@@ -67,7 +67,7 @@ class ObserverChoice(Choice):
 
     GROUP = ESTIMATE
 
-    #: Keys of `vftcli.observers.table.OBSERVERS`. None for `DEFAULT`, or for the paper's four
+    #: Keys of `table.OBSERVERS`. None for `DEFAULT`, or for the paper's four
     #: with its formulas or a common goal.
     names: Annotated[
         tuple[str, ...],
@@ -170,8 +170,6 @@ class ObserverChoice(Choice):
     ) -> "tuple[tuple[Observer, ...], tuple[Remark, ...]]":
         """Observers for one robot and sample time [s], with remarks on unset gains.
 
-        `shown` holds noise and contact of the complete log, None without a free part.
-
         Raises:
             ParameterError: If a gain is out of range, or a match cannot be reached.
         """
@@ -224,7 +222,7 @@ class ObserverChoice(Choice):
         return replace(found, t=terms.t, tau=found.tau[count:], sd=sd)
 
 
-LEAD = 60.0  #: Assumed rest of the arm before a log, in 1/ω_n of the slowest joint.
+LEAD = 60.0  #: Rest before a log, in 1/ω_n of the slowest joint.
 LONGEST = 1 << 17  #: Samples of that time at most.
 SETTLED = 0.01  #: Share of its start left in a settled estimate.
 

@@ -22,7 +22,7 @@ from vftcli.signals.steady_filter import filtered
 
 #: Relative change of a covariance in one sample within rounding.
 SETTLED = 1e-14
-LONGEST = 100_000  #: Samples within which a filter settles; the paper's need some hundred.
+LONGEST = 100_000  #: Most samples until a filter settles.
 #: Below this a·Ts, (e^{aTs} − 1 − aTs)/a² is its series, to a tenth of a·Ts squared.
 SMALL = 1e-5
 
@@ -104,8 +104,7 @@ def printed_hold_steps(
 ) -> tuple[Array, Array, KalmanState]:
     """τ̂ and √P₂₂ with the noise of (44) as printed, sample by sample. (T, n) each
 
-    d (T, n) [N·m·s] is the input, each entry of the model (T, n), and `state` that before
-    the block; at the log's begin, its prior.
+    d (T, n) [N·m·s] is the input, `state` that before the block, or its prior.
     """
     tau, sd = np.zeros((2, *d.shape))
     (error, torque), P = state

@@ -142,7 +142,7 @@ class KalmanState(NamedTuple):
     """State of a Kalman observer after a block of a log."""
 
     error: Array  #: e = p − p̂ [kg·m²/s] and τ̂ [N·m]. (2, n)
-    posterior: Array  #: Their covariance's entries. (3, n), (2, 2, n) of (44) as printed
+    posterior: Array  #: Their covariance's entries. (3, n) or (2, 2, n)
 
 
 def steady(model: Discrete, decay: Array) -> Gains:
@@ -232,7 +232,7 @@ def settle(model: Discrete, entering: Covariance, guess: Covariance) -> Gains:
             phi[0] = step.r / gains.S * u
             phi[1] = step.a22 * phi[1] - gains.l2 * u
         end, ((o11, o12), (_, o22)) = np.stack(P), information
-        # After k rounds the first k blocks are exact; it mostly ends long before.
+        # After k rounds the first k blocks are exact.
         for _ in range(blocks):
             # A start changed by Δ: X = Δ(I + OΔ)⁻¹ in full.
             a, b, c = starts - guessed
@@ -281,7 +281,7 @@ def kalman_steps(
     guess, entering = (Covariance(*(p[kept] for p in each)) for each in (guess, posterior))
     for span in spans(samples, begins=begins):
         fold = Fold.of(span.stop - span.start)
-        # Entries shared by all joints are expanded: rows of one size need no iterator.
+        # Rows of one size need no iterator.
         model = model_of(fold.fold(terms.dt[span]), own)
         model = Discrete(model.step, *map(np.ascontiguousarray, model[1:]))
         gains = settle(model, entering, guess)

@@ -8,8 +8,7 @@ All rest on :math:`\dot p = \mu + \tau_{ext}` (33) with p = M q̇ and
     FDO, GMO   τ̂ᵗ = [(1−a)τ̂ᵗ⁻¹ + K dᵗ]/(1+a),  a = ½K Ts
     KFO        νᵗ = eᵗ⁻¹ + dᵗ − A₁₂τ̂ᵗ⁻¹,  eᵗ = (1−L₁)νᵗ,  τ̂ᵗ = A₂₂τ̂ᵗ⁻¹ + L₂νᵗ
 
-from zero at the log's first sample. `kalman_model` holds A, Q, R and L, also on a clock
-that jitters, `as_printed` the printed variants.
+from zero at the log's first sample. `kalman_model` holds A, Q, R and L, `as_printed` errata.
 """
 
 from abc import abstractmethod
@@ -66,7 +65,7 @@ class BlockObserver(Shown):
 
     @abstractmethod
     def run(self, terms: DynamicsTerms, state: Any = None) -> tuple[ExternalTorque, Any]:  # noqa: ANN401
-        """Estimate of a block, and the observer's state after; None at a log's start."""
+        """Estimate of a block, and the observer's state; None at a log's start."""
 
     def estimate(self, terms: Any) -> ExternalTorque:  # noqa: ANN401 - DynamicsTerms, or a Run
         """The estimate of a whole log, from rest, by its terms or its run."""
@@ -111,10 +110,7 @@ class FirstOrderObserver(BlockObserver):
         d: Array,
         afresh: Array | None = None,
     ) -> tuple[ExternalTorque, FirstOrderState]:
-        """A block's estimate of an input (T, n) [N·m·s], from zero or `afresh` (T, n).
-
-        `afresh` is the torque after a gap. [N·m]
-        """
+        """Estimate by an input (T, n) [N·m·s], after a gap `afresh` (T, n) [N·m]."""
         before, gaps, longest = state or FirstOrderState(np.zeros((1, terms.joints)))
         rate, clock = self.rates(terms.joints), terms.clock
         a = 0.5 * (rate[:, None] * terms.dt[:, 0]).T  # columns whole

@@ -100,10 +100,7 @@ class KalmanSmoother(Shown):
         return ExternalTorque(name=self.name, t=terms.t, tau=handed_over(tau), sd=sd)
 
     def tuning(self, step: float, joints: int) -> Tuning:
-        """Meaning of the parameters: no delay, −3 dB at |H_KFO|² = 1/√2.
-
-        Q_τ/(Q_τ + Q_pω² + Rω⁴) = 1/√2 at the effective densities.
-        """
+        """No delay; −3 dB at |H_KFO|² = Q_τ/(Q_τ + Q_pω² + Rω⁴) = 1/√2."""
         causal = self.filter.tuning(step, joints)
         # In units of ω_n: x⁴ + c x² + 1 = √2 with c = Q_p/√(Q_τR) = 4ζ² − 2.
         c = 4.0 * causal.zeta**2 - 2.0
@@ -120,10 +117,7 @@ class KalmanSmoother(Shown):
 
 
 def from_the_end(F: Array, g: Array, d: Array, weights: Array) -> tuple[Array, Array]:
-    """weights·y_{t+1} of y_t = F_t y_{t+1} + g_t d_t, zero at the end; y_1.
-
-    (T, n), (m, n)
-    """
+    """weights·y_{t+1} (T, n) of y_t = F_t y_{t+1} + g_t d_t, 0 at the end; y_1. (m, n)"""
     if F.ndim == 4:
         F, g, weights = F[:, :, :0:-1], g[:, :0:-1], weights[:, -2::-1]
     start = np.zeros((len(F), d.shape[1]))
@@ -134,10 +128,7 @@ def from_the_end(F: Array, g: Array, d: Array, weights: Array) -> tuple[Array, A
 
 
 def gain_sequence(model: Discrete, prior: Covariance, guess: Covariance) -> Gains:
-    """Gains and covariances of a whole log by its samples' models. (T, n) each
-
-    `prior` is the covariance before the first update, `guess` the stationary one. (n,)
-    """
+    """Gains of a log by its samples' models, from its prior and a guess (n,). (T, n)"""
     first = update(prior, model.r[0])
     rows = [np.array(first)[:, None]]
     entering = first.posterior

@@ -16,10 +16,9 @@ One model gives every estimate's error sample by sample, not its own covariance:
 
     sd² = e² + ∫|1 − H|² S_τ df + c²,
 
-with e² the mean square of the estimator's reading while nothing touches the arm, bias
-and model error included, for a resting and a moving joint apart; and c the standard
-deviation of a subtracted correction. A resting joint's stiction is hidden from every
-estimator: there e is at least the share of the dry friction measured on drives.
+with e² the mean square of the estimator's reading while nothing touches the arm, of a
+resting and a moving joint apart, and c the SD of a subtracted correction. Stiction at
+rest is hidden: there e is at least the share of the dry friction measured on drives.
 """
 
 from collections.abc import Sequence
@@ -50,16 +49,15 @@ SEGMENT = 4.0  #: Length of a segment: slower changes are constant. [s]
 #: Fewest samples of a segment; a shorter part has no spectrum.
 LEAST_SEGMENT = 32
 IMPACT = 1.0  #: Longest contact of a loaded part of impacts. [s]
-#: Reach of the average over neighbouring frequencies, as a share of the frequency.
+#: Reach of the average over neighbours, by the frequency.
 NEIGHBOURS = 0.2
-SLOW = 5.0  #: Up to here the measured spectrum of the external torque holds. [Hz]
+SLOW = 5.0  #: Up to here the external torque's spectrum holds. [Hz]
 #: Beyond, it falls at least as f to the minus this: between the 2 of a torque that jumps
 #: and the 4 of one without jumps and corners.
 FALL = 2.5
 
-#: A found free part is believed if on most joints the loaded part has this share of its
-#: power below `SLOW` beyond the free one's. Reference runs show 0.96 and more, those
-#: touched in every cycle 0.86 and less.
+#: Least share of the loaded part's power below `SLOW` beyond that of a free one. Reference
+#: runs show 0.96 and more, those touched in every cycle 0.86 and less.
 QUIETER = 0.9
 
 
@@ -88,10 +86,8 @@ class Spectra:
 
     @cached_property
     def excess(self) -> Array:
-        """(S_d − S_n)₊, the excess of the loaded part. (F, n) [(N·m)²/Hz]
-
-        Averaged over neighbouring frequencies first: chance has both signs.
-        """
+        """(S_d − S_n)₊, the excess of the loaded part. (F, n) [(N·m)²/Hz]"""
+        # Averaged over neighbouring frequencies first: chance has both signs.
         return handed_over(np.maximum(neighbour_mean(self.loaded - self.free), 0.0))
 
     @cached_property
@@ -117,10 +113,8 @@ class Spectra:
 
     @property
     def floor(self) -> Array:
-        """Noise S_n from its quietest octave up, below at that octave's level. (F, n)
-
-        At low frequencies the rest of S_n is friction and model error.
-        """
+        """Noise S_n from its quietest octave up, below at that octave's level. (F, n)"""
+        # At low frequencies the rest of S_n is friction and model error.
         low, levels, tops = self.width, [], []
         while 2.0 * low <= self.frequency[-1]:
             inside = (self.frequency >= low) & (self.frequency <= 2.0 * low)
@@ -191,7 +185,7 @@ def looks_free(spectra: Spectra) -> bool:
 
 ENOUGH = 50  #: Fewest free samples, at rest or in motion, for a mean square.
 
-#: Error of friction in motion as a share of the dry friction, without free motion to show
+#: Error of friction in motion over dry friction, without free motion to show
 #: it: on a UR10e the maker's friction differs by .05 to .25 of itself from that day's.
 UNSEEN = 0.2
 
@@ -208,10 +202,9 @@ def free_error(read: Array, resting: Mask, dry_friction: Array) -> FreeError:
     """The mean squares of an estimator's free samples, at least one.
 
     With fewer than `ENOUGH` of them at rest, or in motion, all count: a moving joint then
-    adds `UNSEEN` of its dry friction, because its friction in motion is unknown.
+    adds `UNSEEN` of its dry friction.
 
-    `read` is the estimate, NaN where unknown (S, n) [N·m], `resting` whether a joint rests
-    (S, n); dry friction is 0 where it is unknown. (n,) [N·m]
+    `read` (S, n) [N·m] is NaN, dry friction (n,) [N·m] is 0 where unknown.
     """
     known = np.isfinite(read)
     kinds = np.array([known, known & ~resting, known & resting])
@@ -232,8 +225,7 @@ def error_band(
 ) -> Array:
     """Deviation of an estimate's error, by the module's equation. (T, n) [N·m]
 
-    `missed` is `Spectra.missed` (n,) [(N·m)²], `resting` where a joint rests (T, n), and
-    `correction_sd` the SD of a correction of the model. (T, n) [N·m]
+    `missed` is `Spectra.missed` (n,) [(N·m)²], `correction_sd` a correction's. (T, n)
     """
     variance = np.where(resting, free.resting + missed, free.moving + missed)
     if correction_sd is not None:

@@ -37,7 +37,7 @@ FORM = "OBSERVER.PARAMETER=VALUE, as gmo.gain=30 or gmo.gain=5,3,4,10,10,10"
 WORDS = {"noise_convention"}  #: Parameters with words as values.
 #: Parameters that are rates: no log resolves a microsecond. [1/s]
 LARGEST = {"omega": 1e6, "gain": 1e6, "decay": 1e6}
-#: Every other number is a variance: 3·10⁷ N·m, or of its momentum, or gained in a second.
+#: Every other number is a variance, of 3·10⁷ N·m.
 LARGEST_VARIANCE = 1e15
 #: Smallest size of a number but zero: the ratio of two must stay a number.
 SMALLEST = 1e-15
@@ -114,7 +114,7 @@ def overlay_gains(under: Gains, over: Gains) -> Gains:
 
 
 def parameters_given(setup: "Setup", section: str, name: str) -> dict[str, Any]:
-    """Parameters of an observer: the user's before the file's, own before shared."""
+    """An observer's parameters: the user's first, own before shared."""
     # kfo-zoh.r_diag is for that filter alone, kfo.r_diag for all.
     places = (
         (source, key) for source in (setup.gains, setup.settings) for key in (section, name)
@@ -159,7 +159,7 @@ class Entry(NamedTuple):
     summary: str  #: Its work in a sentence.
     #: Builds it from a Setup and its name.
     build: Callable[[Setup, str], Built]
-    from_spectra: bool = False  #: Whether its gains come from the log's spectra.
+    from_spectra: bool = False  #: Whether the log gives its gains.
     online: bool = True  #: Whether it could run online.
 
 
@@ -196,7 +196,7 @@ def build_first_order(setup: Setup, name: str) -> Built:
 
 
 def read_as(convention: str, setup: Setup) -> Setup:
-    """A setup with R and Q of its file under this convention, if none is named."""
+    """A setup with its file's R and Q under this convention."""
     if "kfo" not in setup.gains:
         return setup
     file = {"noise_convention": convention, **setup.gains["kfo"]}
@@ -227,7 +227,7 @@ def build_kfo(setup: Setup, name: str) -> tuple[KalmanObserver, tuple[Remark, ..
 
 
 def build_rts(setup: Setup, _: str) -> Built:
-    """Smoother on the zero-order-hold filter: its noise leaves no bias on a ramp."""
+    """Smoother on kfo-zoh: its noise leaves no bias on a ramp."""
     from vftcli.observers.smoother import KalmanSmoother
 
     kalman, remarks = build_kfo(setup, "kfo-rts")

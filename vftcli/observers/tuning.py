@@ -29,7 +29,7 @@ SLOWEST = 1.0  #: Least natural frequency to try. [rad/s]
 #: That of `best`: as the smoother passes 1/(1 + (ω/ω_n)⁴), it keeps 84 % of the peak of a
 #: half sine of .6 s. A joint without a push may be pushed next. [rad/s]
 SLOWEST_BEST = 9.0
-FASTEST = 2.0  #: Largest natural frequency to try, times the sample time. [rad]
+FASTEST = 2.0  #: Largest ω_n to try, times the sample time. [rad]
 TRIED = 96  #: Natural frequencies to try, evenly in logarithm.
 LEAST_SHARE = 1e-3  #: Least R as a share of the noise in the free part. [1]
 FINEST = 1e-6  #: Least torque of R: single precision keeps 1e-5 of 100 N·m. [N·m]
@@ -111,11 +111,8 @@ def error_curve(kind: Kind, spectra: Spectra, slowest: float = SLOWEST) -> Curve
 
 
 def bound_remarks(name: str, rate: Array, grid: Array) -> tuple[Remark, ...]:
-    """A warning on joints (n,) at a bound of the natural frequencies (G,). [rad/s]
-
-    At the slowest the spectra do not separate external torque from noise; at the fastest,
-    not noise from external torque.
-    """
+    """A warning on joints (n,) at a bound of the natural frequencies (G,). [rad/s]"""
+    # There the spectra do not separate external torque and noise.
     low, high = grid[0], grid[-1]
     reached = (("slowest", rate <= low, low), ("fastest", rate >= high, high))
     return tuple(
@@ -128,9 +125,8 @@ def bound_remarks(name: str, rate: Array, grid: Array) -> tuple[Remark, ...]:
 def noise_level(omega_n: Array, spectra: Spectra) -> Array:
     """R at which the innovations have the variance that the filter expects. (n,)
 
-    Gains depend on Q/R alone; R scales the covariance. The innovation is the estimate's
-    jump, ν = (τ̂ᵗ − τ̂ᵗ⁻¹)/L₂, so its variance follows from S_d. That may be zero, or too
-    small from few impacts, and no filter runs on R = 0: R is at least `LEAST_SHARE` of
+    Gains depend on Q/R alone. The innovation is the estimate's jump, ν = (τ̂ᵗ − τ̂ᵗ⁻¹)/L₂:
+    its variance follows from S_d. No filter runs on R = 0: it is at least `LEAST_SHARE` of
     S_n's R and the noise of `FINEST`, a torque constant over a sample.
     """
     n, unit = len(omega_n), kalman_filter(omega_n)
@@ -182,7 +178,7 @@ class Goal(NamedTuple):
     """A goal of gains."""
 
     name: str  #: A key of `GOALS`.
-    value: float = float("nan")  #: Its number, NaN for the smallest error. [s], [Hz] or [1/h]
+    value: float = float("nan")  #: Its number, or NaN. [s], [Hz] or [1/h]
     #: Torque beyond which an estimate raises an alarm. (n,) or (1,) [N·m]
     threshold: Array | None = None
 
@@ -214,10 +210,7 @@ def parse_goal(
 def match_observers(
     observers: Sequence[Observer], goal: Goal, step: float, joints: int
 ) -> tuple[tuple[Observer, ...], tuple[Remark, ...]]:
-    """Observers with one delay to a slow ramp, or −3 dB bandwidth, with remarks.
-
-    A Kalman filter keeps R and Q_p and moves Q_τ.
-    """
+    """Observers with one delay to a slow ramp, or −3 dB bandwidth, with remarks."""
     tuned = tuple(tune(observer, goal, step, joints) for observer in observers)
     remarks: tuple[Remark, ...] = (fact("bandwidth-matched", bandwidth_Hz=goal.value),)
     if goal.name == "delay":
@@ -280,7 +273,7 @@ class Tuned(NamedTuple):
     rate: Array  #: Natural frequency, cutoff or K. (n,) [rad/s]
     delay: Array  #: Lag behind a slow ramp. (n,) [s]
     rmse: Array  #: Expected error. (n,) [N·m]
-    #: Expected false alarms an hour beyond the goal's threshold; None without one. (n,)
+    #: Expected false alarms an hour, None without a threshold. (n,)
     alarms: Array | None = None
     running: Observer | None = None  #: The observer with these gains.
 
@@ -291,10 +284,7 @@ class Tuned(NamedTuple):
 
 
 def tune_all(spectra: Spectra, goal: Goal) -> tuple[Tuned, ...]:
-    """Gains of FDO, GMO, KFO and smoother for a goal, one line an observer.
-
-    The smoother has no delay: for a delay it gets the gains with the smallest error.
-    """
+    """Gains of FDO, GMO, KFO and smoother for a goal, one line an observer."""
     threshold, n, step = goal.threshold, spectra.joints, spectra.step
     if threshold is not None and len(threshold) not in {1, n}:
         raise ParameterError(
@@ -310,6 +300,7 @@ def tune_all(spectra: Spectra, goal: Goal) -> tuple[Tuned, ...]:
         "fdo": (FilteredDynamicsObserver(omega=shared), np.full(n, shared), {"omega": shared}),
         "gmo": (momentum(first_order), first_order, {"gain": first_order.tolist()}),
     }
+    # For a delay the smoother, which has none, gets the smallest error.
     for name, kind in KALMAN.items():
         rate = rates(kind, spectra, goal)
         r = noise_level(rate, spectra)
