@@ -53,13 +53,19 @@ def propose(
     except RobotError as error:
         if choice.robot.name is not None:
             raise
-        yield from possible_robots(recording, error)
+        fits = guess_robot(recording)[1][:MOST_ROBOTS]
+        unsettled = (
+            "the log does not settle which arm it is: choose one, then inspect again with "
+            "--robot. How well each fits:"
+        )
+        yield ProposedOption(unsettled if fits else str(error))
+        for fit in fits:
+            yield ProposedOption(str(fit), "robot", fit.robot, holds=False)
         return
     if "robot" not in given:
-        fits = [
-            remark.values["fit"] for remark in robot.remarks if remark.code == "robot-guessed"
-        ]
-        yield ProposedOption(f"by {fits[0]}" if fits else "the log names it", "robot", robot.name)
+        guessed = (r.values["fit"] for r in robot.remarks if r.code == "robot-guessed")
+        why = next((f"by {fit}" for fit in guessed), "the log names it")
+        yield ProposedOption(why, "robot", robot.name)
     if "log.effort" not in given:
         effort = effort_of(recording, robot, choice)
         yield effort
@@ -112,20 +118,6 @@ def read_so(recording: Recording) -> Iterator[ProposedOption]:
     if recording.payload_mass:
         words = f"the controller assumes {recording.payload_mass:.3g} kg"
         yield ProposedOption(words, "payload", "log", holds=False)
-
-
-def possible_robots(recording: Recording, error: RobotError) -> Iterator[ProposedOption]:
-    """Possible arms of a log that does not settle which."""
-    fits = guess_robot(recording)[1][:MOST_ROBOTS]
-    if not fits:
-        yield ProposedOption(str(error))
-    else:
-        yield ProposedOption(
-            "the log does not settle which arm it is: choose one, then inspect again with "
-            "--robot. How well each fits:"
-        )
-    for fit in fits:
-        yield ProposedOption(str(fit), "robot", fit.robot, holds=False)
 
 
 def effort_of(recording: Recording, robot: Robot, choice: AnalysisChoice) -> ProposedOption:

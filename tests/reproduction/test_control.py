@@ -7,7 +7,7 @@ import pytest
 
 from vftcli.admittance import ControlChoice
 from vftcli.admittance.replay import Replay, replay
-from vftcli.reproduction.control import (
+from vftcli.reproduction.huang2025 import (
     deviation_chart,
     latest_turns,
     loop_chart,

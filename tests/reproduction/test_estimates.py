@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from vftcli.reproduction.estimates import motion_under_knocks
+from vftcli.reproduction.huang2025 import motion_under_knocks
 from vftcli.reproduction.paper import CORRECTED
 
 

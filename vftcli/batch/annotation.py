@@ -13,6 +13,7 @@ from vftcli.batch.cluster import begin
 from vftcli.batch.datasets import DataFile, ForceColumn, Single, put_rows, stored_rows
 from vftcli.doctor.examination import Examiner
 from vftcli.doctor.signals import efforts_of
+from vftcli.free_motion.free_motion import within
 from vftcli.observers import ObserverChoice, settling_samples
 from vftcli.observers.table import OBSERVERS
 from vftcli.outputs.run_record import observer_record, robot_record, to_json
@@ -132,12 +133,12 @@ def check_signals(recording: Recording, *, anyway: bool) -> None:
             f"{recording.name}: no joint torques or currents, so no forces can be estimated; "
             "ports of DROID and Open X-Embodiment leave them out, DROID's raw release has them"
         )
-    for _, value in efforts if not anyway else ():
-        same = np.flatnonzero((value == value[0]).all(axis=0)) + 1
+    for _, value in () if anyway else efforts:
+        same = np.flatnonzero((value == value[0]).all(axis=0))
         if 2 * len(same) >= recording.joints:
-            joints = ", ".join(f"J{joint}" for joint in same)
+            joints = ", ".join(f"J{j + 1}" for j in same)
             raise LogError(
-                f"{recording.name}: the effort of {joints} is {value[0, same[0] - 1]:g} in every "
+                f"{recording.name}: the effort of {joints} is {value[0, same[0]]:g} in every "
                 "frame, so it was not measured: gravity would be written as force. Name the column "
                 "that was measured with --columns. --anyway continues despite this"
             )
@@ -156,9 +157,8 @@ def columns_of(analysis: Analysis, choice: ForceChoice) -> dict[str, Single]:
         found["external_torque_sd"] = estimate.sd
     if choice.wrench is not None:
         found["wrench"] = analysis.wrenches[0].known
-    if choice.contacts and analysis.contacts is not None:
-        inside = [(t >= c.start) & (t <= c.stop) for c in analysis.contacts.contacts]
-        touched = np.any(inside, axis=0) if inside else np.zeros(len(t), dtype=bool)
+    if choice.contacts:
+        touched = within(t, [(contact.start, contact.stop) for contact in analysis.listed])
         found["contact"] = touched[:, None].astype(np.float64)
     samples = analysis.recording.source.row_samples
     return {name: by_row(values, samples) for name, values in found.items()}

@@ -184,7 +184,7 @@ def connected(choice: WorkersChoice, seen: Sequence[str], tell: Tell) -> Iterato
 
 @contextmanager
 def local(choice: WorkersChoice, tell: Tell) -> Iterator["Client"]:
-    """A cluster of processes on this machine, behind a certificate of this run."""
+    """A cluster on this machine, behind a certificate of this run."""
     from dask.system import CPU_COUNT
     from distributed import Client, Security
     from distributed.system import MEMORY_LIMIT
@@ -210,7 +210,7 @@ def local(choice: WorkersChoice, tell: Tell) -> Iterator["Client"]:
 
 @contextmanager
 def standing(choice: WorkersChoice, tell: Tell) -> Iterator["Client"]:
-    """The cluster of the scheduler at this address, with a worker at least."""
+    """The scheduler's cluster at this address, with a worker at least."""
     from distributed import Client, Security
 
     names = ("tls_ca_file", "tls_client_cert", "tls_client_key")

@@ -40,7 +40,7 @@ from vftcli.signals.wrench import AXES
 
 @cache
 def digest_of(path: Path) -> str:
-    """The sha256 of a file, or of a folder's files and their names; read once."""
+    """The sha256 of a file, or of a folder's names and files."""
     if not path.is_dir():
         return digest(path)
     lines = (f"{file.relative_to(path).as_posix()} {digest(file)}" for file in files_of(path))

@@ -258,7 +258,12 @@ class LogCollection:
         """The logs of files, folders and patterns, each once."""
         given: set[Path] = set()
         for place in places:
-            for path in map(absolute, matching(place)):
+            found = [place]
+            # A name may hold such a letter: a file that is there wins.
+            if not place.exists() and set("*?[") & set(str(place)):
+                top = Path(place.anchor)
+                found = sorted(top.glob(str(place.relative_to(top))))
+            for path in map(absolute, found):
                 if path not in given:
                     given.add(path)
                     yield from self._inside(path) if path.is_dir() else self._parts(path)
@@ -335,15 +340,6 @@ class LogCollection:
         if lines and all(len(NUMBER.findall(line)) < FEWEST for line in lines[1:3]):
             return False
         return not stored_observers(path)
-
-
-def matching(place: Path) -> list[Path]:
-    """A path, or the paths that fit a pattern."""
-    # A name may hold such a letter: a file that is there wins.
-    if place.exists() or not set("*?[") & set(str(place)):
-        return [place]
-    top = Path(place.anchor)
-    return sorted(top.glob(str(place.relative_to(top))))
 
 
 def files_written(folder: Path) -> set[str]:

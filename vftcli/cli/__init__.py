@@ -25,7 +25,7 @@ from vftcli.signals.parsing import printable
 
 
 def make_app(load: Collection[str] = COMMANDS) -> typer.Typer:
-    """The command line; a command that is not to be loaded has its summary only."""
+    """The command line; of a command not to be loaded the summary only."""
     app = typer.Typer(
         cls=JourneyGroup,
         help=vftcli.__doc__,

@@ -4,6 +4,7 @@ import os
 import re
 from collections.abc import Container
 from functools import partial
+from itertools import pairwise
 from pathlib import Path
 from typing import NamedTuple
 
@@ -101,8 +102,12 @@ def renewed(words: list[str], options: Container[str]) -> tuple[list[str], list[
                 arguments.append(value.replace("=", ":=", 1))
             else:
                 found.extend(each.replace("VALUE", value) for each in now.split())
-    if arguments:
-        add_arguments(found, arguments)
+    if arguments:  # of a xacro, whose robot the words must name
+        given, pairs = " ".join(arguments), enumerate(pairwise(["", *found]))
+        robots = [k for k, (a, b) in pairs if a == "--robot" or b.startswith("--robot=")]
+        if not robots:
+            raise ParameterError(f"--robot-arg is now --robot 'FILE {given}'; give --robot")
+        found[robots[0]] += f" {given}"
     return found, notes
 
 
@@ -114,12 +119,3 @@ def now_of(name: str, value: str) -> str | None:
         raise ParameterError(f"{name} is gone; {former()['gone'][name]}")
     there: dict[str, str] = former()["options"]
     return there.get(f"{name[2:]}={value}") or there.get(name[2:])
-
-
-def add_arguments(words: list[str], arguments: list[str]) -> None:
-    """Add the arguments of a xacro to the robot, which the words must name."""
-    for k, word in enumerate(words):
-        if word.startswith("--robot=") or (k and words[k - 1] == "--robot"):
-            words[k] = " ".join([word, *arguments])
-            return
-    raise ParameterError(f"--robot-arg is now --robot 'FILE {' '.join(arguments)}'; give --robot")

@@ -77,7 +77,7 @@ def show(text: str) -> None:
 
 
 def echo_top(text: str) -> None:
-    """Print a result to stdout; without --details as many lines as fit beside the words."""
+    """Print a result to stdout; without --details what fits beside the words."""
     from vftcli.outputs.screen import FILE_LINES, MOST_LINES
 
     lines = text.rstrip("\n").split("\n")

@@ -101,7 +101,7 @@ def show_first_lines(made: "Analysis") -> None:
 def show_answers(
     analyses: "Sequence[Analysis]", failed: Mapping[str, str], *, details: bool, begun: bool
 ) -> None:
-    """Print the screen, or what follows its first lines; with details every table too."""
+    """Print the screen, or its rest; with details every table too."""
     from vftcli.outputs.error_tables import to_terminal
     from vftcli.outputs.grid import terminal
     from vftcli.outputs.grids import print_grid

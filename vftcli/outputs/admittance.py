@@ -89,7 +89,7 @@ RETURNS = (
 
 
 def comparison_grid(rows: Sequence[Record], title: str = "") -> Grid:
-    """Every controller on one force (Figs 7 and 10), sorted by axis and drag."""
+    """Every controller on one force (Figs 7, 10), by axis and drag."""
     # Sorting keeps the order of the controllers within a drag.
     ordered = sorted(rows, key=lambda row: (AXES.index(row["axis"]), row["drag"]))
     return keyed_grid(COLUMNS, ordered, title, swatches=True)

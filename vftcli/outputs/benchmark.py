@@ -114,8 +114,7 @@ class Results:
     def pooled(self, key: str) -> Iterator[tuple[Record, Score]]:
         """Place and score of logs together, of torques by "joint", of wrenches by "axis"."""
         for _, own in self.table.drop_nulls(key).group_by(*PLACE, maintain_order=True):
-            joints = own.group_by(key, maintain_order=True)
-            sums = joints.agg(pl.col(*Score._fields).explode())
+            sums = own.group_by(key, maintain_order=True).agg(pl.col(*Score._fields).explode())
             yield own.select(*FACTS).row(0, named=True), Score.pooled(sums.to_dicts())
 
     def torques(self) -> Iterator[Record]:
@@ -208,7 +207,12 @@ class Results:
             marked = any(row["rmse"].mark for row in texts)
             shown = keyed_grid(ARM_COLUMNS, texts, title, swatches=True)
             yield replace(shown, notes=(NEAR,) * marked, marked=marked)
-        wrench = [wrench_numbers(*pooled) for pooled in self.pooled("axis")]
+        wrench = list[Record]()
+        for about, score in self.pooled("axis"):
+            wrench.append(about | {"missing": score.mean(score.missing)[0]})
+            for name, sums in (("", score.squares), ("true_", score.truth)):
+                force, moment = np.sqrt(score.mean(sums).reshape(2, 3).sum(axis=1))
+                wrench[-1] |= {f"{name}force": force, f"{name}moment": moment}
         weight = self.table.filter(part="weight").to_dicts()
         if wrench:
             yield keyed_grid(WRENCH_COLUMNS, wrench, "Wrench in contact, rms error")
@@ -219,15 +223,6 @@ class Results:
 def seen(rows: pl.DataFrame, key: str) -> list[str]:
     """The values of a column in order."""
     return rows[key].unique(maintain_order=True).to_list()
-
-
-def wrench_numbers(about: Record, score: Score) -> Record:
-    """Of force and moment the estimate's error and the truth itself."""
-    found: Record = {**about, "missing": score.mean(score.missing)[0]}
-    for name, sums in (("", score.squares), ("true_", score.truth)):
-        force, moment = np.sqrt(score.mean(sums).reshape(2, 3).sum(axis=1))
-        found |= {f"{name}force": force, f"{name}moment": moment}
-    return found
 
 
 def arm_texts(rows: Sequence[Record]) -> list[Record]:
@@ -300,6 +295,15 @@ def render_benchmark(results: Results, title: str, record: Record) -> str:
     contact = results.numbers.filter(part="contact").partition_by("protocol", maintain_order=True)
     # The worst 10 s of `best` in every log, by the log's first protocol.
     drawn = results.table.filter(part="worst").unique("log", keep="first", maintain_order=True)
+    charts = list[Chart]()
+    for row in drawn.to_dicts():
+        t, truth, estimate = (np.array(row[f"worst_{x}"]) for x in ("t", "truth", "estimate"))
+        lines = [
+            ChartLine("truth", truth[:, None], REFERENCE),
+            ChartLine(BEST, estimate[:, None], results.colours[BEST]),
+        ]
+        name = f"{row['log']}, {row['protocol']}, J{row['worst_joint']}"
+        charts.append(Chart.of_one(row["log"], name, "N·m", t, lines))
     return page(
         "benchmark.html",
         title,
@@ -307,17 +311,7 @@ def render_benchmark(results: Results, title: str, record: Record) -> str:
         results=results,
         methods=[*results.colours],
         plots=[dots(own, [*results.colours]) for own in contact],
-        worst=[worst_chart(row, results.colours[BEST]) for row in drawn.to_dicts()],
+        worst=charts,
         logs=keyed_grid({key: key.replace("_", " ") for key in keys}, record["logs"]),
         record=record,
     )
-
-
-def worst_chart(row: Record, colour: str) -> Chart:
-    """The truth and `best` over the worst span of a log."""
-    lines = [
-        ChartLine("truth", np.array(row["worst_truth"])[:, None], REFERENCE),
-        ChartLine(BEST, np.array(row["worst_estimate"])[:, None], colour),
-    ]
-    name = f"{row['log']}, {row['protocol']}, J{row['worst_joint']}"
-    return Chart.of_one(row["log"], name, "N·m", np.array(row["worst_t"]), lines)

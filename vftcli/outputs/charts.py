@@ -12,6 +12,7 @@ from typing import NamedTuple, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from vftcli.free_motion.free_motion import within
 from vftcli.signals.arrays import Array, Mask, gaps_of
 
 #: Okabe and Ito's hues, in tones visible on white and on black.
@@ -200,9 +201,7 @@ def level_rows(
         unknown = np.flatnonzero(np.isnan(line))
         _, first = np.unique(np.searchsorted(starts, unknown, "right"), return_index=True)
         kept[unknown[first]] = True
-    for begin, end in whole:
-        kept[(t >= begin) & (t <= end)] = True
-    return np.flatnonzero(kept)
+    return np.flatnonzero(kept | within(t, whole))
 
 
 def even_starts(samples: int, stretches: int) -> Index:
@@ -211,7 +210,7 @@ def even_starts(samples: int, stretches: int) -> Index:
 
 
 def extremes(lines: Sequence[Array], starts: Index) -> Index:
-    """Of lines (T,) the first lowest and highest known sample of a stretch, else its first."""
+    """Lowest and highest known sample of lines (T,) a stretch, else its first."""
     stops, kept = np.append(starts[1:], len(lines[0])), list[Index]()
     longest = np.arange(max(stops - starts))
     at = np.minimum(starts[:, None] + longest, stops[:, None] - 1)

@@ -90,9 +90,8 @@ def write_mcap(path: Path, analysis: Analysis) -> None:
     for wrench in analysis.wrenches:
         # Flange, tool or sensor, or base axes there.
         frame = "base@flange" if wrench.frame == "base" else wrench.frame
-        topics.append(
-            wrench_topic(f"/vftcli/wrench/{ros_name(wrench.name)}", frame, wrench.known)
-        )
+        name = f"/vftcli/wrench/{ros_name(wrench.name)}"
+        topics.append(wrench_topic(name, frame, wrench.known))
     write_topics(path, stamps, topics, events(analysis, int(stamps[0])))
 
 
@@ -105,7 +104,7 @@ def wrench_topic(name: str, frame: str, values: Array) -> OutputTopic:
 def events(analysis: Analysis, start: int) -> list[Event]:
     """Messages at begin and end of each contact; `start` is the log's stamp. [ns]"""
     made = list[Event]()
-    for contact in analysis.contacts.contacts if analysis.contacts else ():
+    for contact in analysis.listed:
         level = WARNING if contact.trust == "weak" else INFO
         end = f"{contact_name(contact)} ends"
         for t, words in ((contact.start, beginning(contact)), (contact.stop, end)):

@@ -139,7 +139,7 @@ def on_paper(drawing: Drawing) -> "Figure":
 
 
 def force_drawing(found: ContactList, t: "Array | Sequence[float]" = ()) -> Drawing:
-    """|F| of every contact with its 95 % band over the log's clock. (T,) [s]"""
+    """|F| of every contact with its 95 % band. (T,) [s]"""
     courses = [c.course for c in found.contacts if c.course is not None]
     lines = [ChartLine("|F|", c.force[:, None], half=c.band[:, None], x=c.t) for c in courses]
     spans = contact_spans(found.contacts)

@@ -213,7 +213,7 @@ def terminal(grid: Grid, letters: Callable[[str], str] = str, indent: int = 0) -
 def table_lines(
     grid: Grid, letters: Callable[[str], str], shown: Sequence[int] | None = None
 ) -> list[str]:
-    """Lines of headings and rows, summaries below a rule; of some columns, headings wrap."""
+    """Lines of headings and rows; of some columns, headings wrap."""
     columns, cells = list[list[str]](), grid.cells
     every = range(len(grid.columns)) if shown is None else shown
     for k in every:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from vftcli.analysis import Analysis
 from vftcli.contacts.contact_list import ContactList
+from vftcli.free_motion.free_motion import within
 from vftcli.observers.table import BEST
 from vftcli.outputs import FULL, LEVELS
 from vftcli.outputs.charts import COLOURS, GREY, PLACES, REFERENCE, SPARE, Chart, ChartLine
@@ -169,10 +170,8 @@ def force_plot(analysis: Analysis, wrench: Wrench) -> Chart:
         level = -BELOW * np.nanmax(np.concatenate([size[:, 0], [1.0], force]))
         # A line a part of the arm, so that the legend names them.
         for where, colour in PLACES.items():
-            bar = np.full((len(t), 1), np.nan)
-            for contact in found.contacts:
-                if contact.where == where:
-                    bar[(t >= contact.start) & (t <= contact.stop)] = level
+            spans = [(c.start, c.stop) for c in found.contacts if c.where == where]
+            bar = np.where(within(t, spans), level, np.nan)[:, None]
             if np.isfinite(bar).any():
                 lines.append(ChartLine(f"{BAR}{where}", bar, colour))
         if felt:

@@ -133,7 +133,7 @@ def seal(
 
 
 def to_json(record: Record | Sequence[Any]) -> str:
-    """A record, or rows, as JSON text; null for numbers that are not finite."""
+    """A record, or rows, as JSON; null for numbers that are not finite."""
     text = json.dumps(jsonable(record), indent=2, ensure_ascii=False, allow_nan=False)
     return NUMBERS.sub(lambda found: " ".join(found.group().split()), text) + "\n"
 

@@ -144,7 +144,7 @@ def log_screen(
 
 
 def first_lines(analysis: Analysis, canvas: Canvas) -> str:
-    """The facts, the answer and |F| as bars: of a log's screen what needs no observer."""
+    """Facts, answer and |F| as bars: what needs no observer."""
     first, *answered = head_lines(analysis, canvas)
     bars = list[str]()
     if sized := [contact for contact in analysis.listed if contact.size_known]:
@@ -214,7 +214,7 @@ def list_lines(found: ContactList, most: int | None, canvas: Canvas) -> list[str
 
 
 def belief_lines(found: Sequence[Ground], canvas: Canvas, most: int | None) -> list[str]:
-    """Lines of grounds, some a ground, one if it is good; remedies below them."""
+    """Lines of grounds, one for a good one; remedies below."""
     lines = ["Can it be believed?"]
     good = [ground for ground in found if ground.standing == "good"]
     if most == 0 and len(good) > 1:
@@ -247,7 +247,7 @@ def ground_lines(
 
 
 def against(block: "Block", analysis: Analysis) -> str:
-    """One line on the errors: the leading observer, and the others' range."""
+    """One line on the errors: the least, and the others' range."""
     means = block.means
     if not means.errors:
         return f"Against {block.reference}: no sample in common with the estimates"
@@ -271,7 +271,7 @@ def logs_screen(
     *,
     every: bool = False,
 ) -> str:
-    """The screen of several logs: one line a log, then the worst findings."""
+    """The screen of several logs: a line each, then the worst findings."""
     lines = [log_line(analysis) for analysis in analyses]
     free = dict.fromkeys(r.recording.name for a in analyses for r in a.motion.runs)
     parts = (

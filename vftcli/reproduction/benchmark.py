@@ -151,7 +151,7 @@ class BenchmarkRun:
             self.robots[robot.name] = path
 
     def tasks(self) -> Iterator[ScoreTask]:
-        """A task per log and protocol, and per log of an arm with outside estimates."""
+        """A task a log and protocol, and a log of an arm with outside estimates."""
         logs = self.logs
         for log in logs.values():
             words: dict[str, dict[str, object]] = {"alone": {}}
@@ -222,7 +222,7 @@ class BenchmarkRun:
 
 
 def write_log(log: BenchmarkLog, base: BenchmarkLog, command: str, path: Path) -> None:
-    """Write the log of an entry, with its truth: pushed, simulated, or of several files."""
+    """Write the log of an entry, with its truth: pushed, simulated, of files."""
     if log.pushes:
         choice = replace(base.choice(), examiner=Examiner(anyway=True))
         read = choice.library.open(base.paths[0], replace(choice.read, derive="none"))

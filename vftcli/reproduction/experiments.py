@@ -32,8 +32,14 @@ from vftcli.outputs.grid import (
 from vftcli.outputs.page.shell import page
 from vftcli.outputs.paper import Drawing, figure_files, line_figure, plots_of, write_figures
 from vftcli.outputs.run_record import envelope, seal
-from vftcli.reproduction.control import closed_loop, latest_turns, released
-from vftcli.reproduction.estimates import assembled_bearing, dragged_sensor, tapped_circle
+from vftcli.reproduction.huang2025 import (
+    assembled_bearing,
+    closed_loop,
+    dragged_sensor,
+    latest_turns,
+    released,
+    tapped_circle,
+)
 from vftcli.reproduction.paper import FLOOR, Experiment, Given, Paper, PaperItem, Value
 from vftcli.reproduction.timing import computing_time
 from vftcli.signals.progress import stage
@@ -79,7 +85,7 @@ def run_job(job: Job) -> RunResult:
 def run_jobs(
     experiments: Sequence[Experiment], workers: int | None = None
 ) -> list[tuple[str, Result]]:
-    """Name of an experiment and its results, a pair a seed; timed ones run last, alone."""
+    """Experiment and results, a pair a seed; timed ones run last, alone."""
     jobs = [(e, seed) for e in experiments for seed in e.seeds]
     stage(f"{len(jobs)} runs")
     alone, found = (job for job in jobs if job[0].alone), dict[tuple[str, int], Result]()
@@ -101,7 +107,7 @@ def run_jobs(
 def gather(
     paper: Paper, names: Sequence[str], results: Iterable[tuple[str, Result]]
 ) -> dict[str, PaperItem]:
-    """Name of an item → it with its results, a list over the seeds for each value."""
+    """Name of an item → it with its results, each a list over the seeds."""
     found = {}
     for name in names:
         item = paper.items[name]
@@ -175,14 +181,13 @@ def overview(found: Mapping[str, PaperItem]) -> Grid:
     for name, item in found.items():
         link = f'<a href="#{name}">{escape(item.label)}</a>'
         ratio = beside_print(item)
-        row = (
+        rows.append((
             GridCell(item.label, html=link),
             wrapped(item.title),
             ratio,
             DASH if ratio == DASH else item.nearest,
             wrapped("; ".join(item.failures) or item.verdict),
-        )
-        rows.append(row)
+        ))  # fmt: skip
     columns = (
         "item",
         Column("what it shows", words=True, seldom=True),

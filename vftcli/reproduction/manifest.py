@@ -225,7 +225,7 @@ class Manifest:
                 yield f"{what} is of the same day, {log.day}"
 
     def complaints(self, rivals: Sequence[Rival]) -> list[tuple[str, str]]:
-        """Entry and line of what is unfair or another file, among the logs that are there."""
+        """Entry and line of what is unfair or another file, of logs that are there."""
         found: dict[tuple[str, str], None] = {}  # an entry with pushes has every line once
         for log in self.logs.values():
             if log.missing:

@@ -192,7 +192,7 @@ def outside_answer(recording: Recording, log: BenchmarkLog, rival: Rival) -> Ans
 
 
 def at_the_logs_times(read: RawLog, recording: Recording, path: Path) -> Mapping[str, Array]:
-    """Signals of a file beside a log, at the log's stamps; NaN beyond the file's."""
+    """A file's signals at the log's stamps; NaN beyond its own."""
     t, signals = since_start(read.stamps, recording), read.signals
     if len(t) == recording.samples and abs(t - recording.t).max() < SAME:
         return signals

@@ -138,7 +138,7 @@ def force_chart(analysis: Analysis, found: ContactList) -> Chart | None:
 
 
 def highest(found: ContactList, others: Sequence[ChartLine] = ()) -> float:
-    """Upper end of the axis, by peaks with bands, the detectable force, lines. [N]"""
+    """Upper end of the axis, by peaks, detectable force, lines. [N]"""
     tops = [0.0, 2.5 * (found.detectable_force or 0.0)]
     tops += [1.05 * np.nanmax(line.values, initial=0.0) for line in others]
     for contact in found.contacts:

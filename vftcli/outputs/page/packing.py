@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from vftcli.free_motion.free_motion import within
 from vftcli.outputs import Record
 from vftcli.outputs.charts import GAP_STEPS, REFERENCE, Chart, ChartLine, paint
 from vftcli.signals.arrays import Array, gaps_of
@@ -64,9 +65,7 @@ class PageClock:
         self.blob, self.t, self.whole = blob, t, len(t) <= WHOLE
         if not self.whole:
             # Half of the stretches are near the spans; none reaches over a gap.
-            near = np.zeros(len(t), dtype=bool)
-            for start, stop in spans:
-                near |= (t >= start - AROUND) & (t <= stop + AROUND)
+            near = within(t, [(start - AROUND, stop + AROUND) for start, stop in spans])
             share, weight = near.mean(), np.ones(len(t))
             if 0 < share < 1:
                 weight = np.where(near, 0.5 / share, 0.5 / (1.0 - share))
@@ -129,7 +128,7 @@ class PageClock:
 
 
 def step_of(values: Array, unit: str) -> float:
-    """Step of a series: its unit's, smaller for small values, 0 for other units."""
+    """Step of a series: its unit's, less for small values, 0 without one."""
     return min(LARGEST.get(unit, 0.0), largest(values) / FEWEST)
 
 

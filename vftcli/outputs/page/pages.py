@@ -251,7 +251,7 @@ def render_logs(
     analyses: Sequence[Analysis] = (),
     below: str = "",
 ) -> str:
-    """The page over several logs: those of a report with their `analyses`, or of a batch."""
+    """The page of several logs: a report's with their `analyses`, or a batch's."""
     title, lead = logs_headline(lines)
     robots = dict.fromkeys(line.robot for line in lines)
     each = zip(lines, analyses, strict=False)
