@@ -106,7 +106,7 @@ def driven(motion: Recording, robot: Robot) -> tuple[Recording, Array]:
     torque = asked(robot)
     constant = 1.0 if robot.torque_constant is None else robot.torque_constant
     return replace(motion, current=torque / constant, torque=torque), asked(
-        robot.without_friction()
+        replace(robot, friction=())
     )
 
 

@@ -227,8 +227,8 @@ NONE = only("no-temperature", level="fact", reference_C=[35.0], **ROUNDED)
         # a temperature that nobody stated is assumed
         (warm_log(22.0), SILENT, far("far-temperature-assumed", 22.0, level="caution")),
         (warm_log(27.0), SILENT, only()),
-        (warm_log(None), UR5E.without_friction(), only()),
-        (warm_log(5.0), UR5E.without_friction(), only()),
+        (warm_log(None), replace(UR5E, friction=()), only()),
+        (warm_log(5.0), replace(UR5E, friction=()), only()),
         (warm_log(5.0), load_robot("panda"), only()),
     ],
 )

@@ -198,7 +198,7 @@ def test_an_arm_carries_the_inertia_of_a_load_too(log):
     """As with the same load mounted; or every start and stop would look like a push."""
     load = FreeLoad(mass=3.0, moment=PAYLOAD[1:], sd=0.1, moment_sd=np.ones(3), share=0.5)
     body = Payload(mass=3.0, com=PAYLOAD[1:] / 3.0, inertia=np.zeros((3, 3)))
-    arm = ROBOT.without_friction()
+    arm = replace(ROBOT, friction=())
     bare, mounted = (Run(recording=log, robot=robot) for robot in (arm, arm.with_payload(body)))
     found = without_load(bare, load)
     np.testing.assert_allclose(found.terms.p, mounted.terms.p, atol=1e-9)

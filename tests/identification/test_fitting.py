@@ -327,7 +327,7 @@ def test_a_simulators_arm_has_no_friction(method):
     """Rotors and links are fitted, friction neither competes nor stands in the file."""
     rotor = UR5.chain.rotor_inertia * 1.2
     true = replace(UR5, chain=replace(UR5.chain, rotor_inertia=rotor), friction=())
-    profile = UR5.without_friction()
+    profile = replace(UR5, friction=())
     found = identify([log(true)], profile, Task(method=method, friction=False), [log(true, 7)])
     assert found.robot.friction == ()
     joints, account = (found.robot.document[key] for key in ("joints", "identification"))
@@ -351,7 +351,7 @@ def test_a_simulators_arm_has_no_friction(method):
 
 def test_torques_behind_the_gears_leave_the_friction_method_nothing_to_find():
     """Without friction: the rotor is before the gear, the links are the profile's."""
-    robot = replace(UR5, torque_source="link_torque", torque_constant=None).without_friction()
+    robot = replace(UR5, torque_source="link_torque", torque_constant=None, friction=())
     with pytest.raises(errors.IdentificationError, match="nothing to find"):
         identify([log(robot)], robot, Task(method="friction", friction=False))
     found = identify([log(robot)], robot, Task(method="base", friction=False))

@@ -40,7 +40,7 @@ def motion(joints: int, samples: int = 400, rate: float = 500.0) -> tuple[np.nda
 
 def test_mu_integrates_to_the_momentum_of_free_motion():
     """On torque made by Pinocchio's inverse dynamics, ṗ = μ: nothing is left to explain."""
-    robot = load_robot("ur5").without_friction()
+    robot = replace(load_robot("ur5"), friction=())
     t, q, dq, ddq = motion(6)
     data = robot.model.createData()
     tau = np.array([pin.rnea(robot.model, data, *x) for x in zip(q, dq, ddq, strict=True)])

@@ -170,7 +170,7 @@ def test_follows_another_engine(logs: Path) -> None:
 
 def test_presliding_friction_is_a_spring_that_yields() -> None:
     """A drive torque below it deflects the joint by torque / stiffness; above it the joint goes."""
-    robot = load_robot("ur5").without_friction()
+    robot = replace(load_robot("ur5"), friction=())
     giving, reach, n = 4.0, 1e-3, robot.joints
     spec = FrictionSpec(presliding_length=reach)
     # viscous friction to settle in; the spring is 4 kN·m/rad, the lightest inertia .2 kg·m²

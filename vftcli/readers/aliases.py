@@ -74,7 +74,7 @@ AXES = re.compile(r"(?i)r?[xyz]|q[wxyz]|roll|pitch|yaw")
 
 FEWEST_JOINTS = 3
 
-RESIDUAL_TURNED = fact("residual-turned")  #: Said wherever libfranka's residual is used.
+RESIDUAL_TURNED = fact("residual-turned")  #: Of libfranka's residual.
 EFFORT_IS_CURRENT = fact("effort-is-current")
 
 
@@ -275,12 +275,9 @@ def wrench_pick(table: Table) -> Item | None:
 
 
 def clock_pick(table: Table) -> Item | None:
-    """The clock's column, or its seconds and nanoseconds; None if there is none.
-
-    A message's own stamp goes before a recorder's.
-    """
+    """The clock's columns, a message's own stamp before a recorder's, or None."""
     names = [name.lower() for name in table.names]
-    found: list[tuple[int, ...]] = []  # whole seconds and nanoseconds, as ROS writes its stamps
+    found: list[tuple[int, ...]] = []  # seconds and nanoseconds, as ROS has them
     for column, name in enumerate(names):
         if match := NANOSECONDS.fullmatch(name):
             wanted = {match["stem"] + word for word in ("sec", "secs", "second", "seconds", "s")}

@@ -78,10 +78,7 @@ def read(file: LogFile, request: ReadChoice, layout: LogFormat) -> RawLog:
 
 @contextmanager
 def episodes(file: LogFile) -> Iterator[Episodes]:
-    """The logs of JSON or a pickle: one for each skill of frankapy, else one.
-
-    frankapy has one dictionary a skill, {0: {skill_state_dict: {…}}}; panda-py has one.
-    """
+    """The logs of JSON or a pickle: one for each skill of frankapy, else one."""
     packed = file.head.startswith(b"\x80")
     first = file.first_line.strip()
     # One object a line: the first line is one by itself, and is not all.
@@ -189,10 +186,7 @@ MATLAB_NUMBERS = {
 
 
 def _read_matlab(file: LogFile, request: ReadChoice) -> RawLog:
-    """A .mat file's log, a row a sample; joints × samples are turned, with a remark.
-
-    The length of the time decides.
-    """
+    """A .mat file's log; joints × samples are turned by the time's length, with a remark."""
     variables = _matlab_73(file) if file.head.startswith(V73) else _matlab_5(file)
     if not variables:
         raise LogError(f"{file.path}: a MATLAB file without variables of numbers, so no log.")

@@ -203,7 +203,7 @@ GARBAGE_ROWS = 100
 GARBAGE_VALUE = 1e6
 
 DENORMAL = 1e-300
-ABSURD_STAMP = 1e19  #: Nanoseconds since 1970 stay below this for some centuries.
+ABSURD_STAMP = 1e19  #: Beyond nanoseconds since 1970.
 
 
 def without_leading_garbage(raw: RawLog) -> RawLog:
@@ -227,7 +227,7 @@ def without_leading_garbage(raw: RawLog) -> RawLog:
     jumps = np.flatnonzero(~((steps >= 0) & (steps <= max(60.0, 1000 * usual)))) + 1
     jump = int(jumps[-1]) if jumps.size else 0
     if not absurd[0] and jump == 0:
-        return raw  # a lone bad value among good rows of one clock is not a misaligned packet
+        return raw  # a lone bad value is no misaligned packet
     count = max(int(np.flatnonzero(absurd)[-1]) + 1, jump)
     if count >= len(raw.stamps) - 1 or absurd[:count].mean() < 0.1:
         return raw
@@ -335,10 +335,7 @@ BAD_SHARE = 0.05
 
 
 def _refuse_degrees(raw: RawLog, path: Path) -> None:
-    """Raise a LogError if positions of unstated unit can hardly be radians.
-
-    No joint goes further than two turns from zero, none of seven-joint arms beyond one.
-    """
+    """Raise a LogError if positions of unstated unit can hardly be radians."""
     q = raw.signals["q"]
     limit = ONE_TURN if q.shape[1] == 7 else TWO_TURNS
     beyond = np.concatenate([np.any(np.abs(rows) > limit, axis=1) for rows in pieces(q)])

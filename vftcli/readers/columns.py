@@ -274,10 +274,7 @@ def _begins_with_motion(t: Array, blocks: Sequence[Array]) -> bool:
 
 
 def _is_derivative(t: Array, x: Array, dx: Array) -> bool:
-    """Whether all that moves in x is the integral of its own column of dx.
-
-    Compared is what the integral leaves of the change over some rows.
-    """
+    """Whether all that moves in x is the integral of its own column of dx."""
     left = x - integral(t, dx)
     own = np.full(x.shape[1], False)
     for step in STEPS:

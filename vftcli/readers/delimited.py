@@ -19,7 +19,7 @@ from vftcli.signals.remarks import fact
 SEPARATORS = (",", ";", "\t", " ")
 TAIL_BYTES = 128 * 1024
 BLOCK_BYTES = 1 << 22  #: Text that is parsed at a time.
-COMPARED_ROWS = 20  #: Rows before the last that tell whether its last number is whole.
+COMPARED_ROWS = 20  #: Rows that tell whether the last number is whole.
 
 
 def is_number(text: str) -> bool:
@@ -189,10 +189,7 @@ class TextTable(Table):
                 return
 
     def _mended(self, text: bytes) -> bytes:
-        """A text with plain line ends and whole rows.
-
-        Blank lines, doubled blanks and those before a cell are left out.
-        """
+        """A text with plain line ends and whole rows, without blank lines and blanks."""
         text = text.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
         if self.separator == " ":
             text = re.sub(rb"[ \t]+", b" ", text).replace(b"\n ", b"\n").replace(b" \n", b"\n")

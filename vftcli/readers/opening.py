@@ -74,9 +74,9 @@ class LogFile:
     """A file or folder as the readers see it: its first bytes already unwrapped."""
 
     path: Path
-    #: The first bytes of the content, unpacked from gzip or zstd; empty for a folder.
+    #: The first bytes of the content, unpacked; empty for a folder.
     head: bytes = b""
-    entries: tuple[str, ...] = ()  #: Names in the folder, sorted; empty for a file.
+    entries: tuple[str, ...] = ()  #: Names in the folder, sorted.
     #: What the file is compressed with as a whole, or None.
     wrapping: Wrapping | None = None
 

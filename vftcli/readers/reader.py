@@ -27,7 +27,7 @@ class RawLog:
     #: What has to be added to the stamps to be on the log's own clock. [s]
     origin: float = 0.0
     clock: str  #: Which clock the stamps are from, in words.
-    #: Which of several recordings in the file is wanted, from 1; None for all.
+    #: Which of several recordings is wanted, from 1; None for all.
     segment: int | None = None
     signals: (
         #: Field of Recording → (T, n), `wrench` → (T, 6), in SI units.
@@ -79,7 +79,7 @@ class ReadChoice(Choice):
 
     GROUP = LOG
 
-    #: Name of a format in `vftcli.readers.FORMATS`, None to recognise it by its content.
+    #: Name of a format in `vftcli.readers.FORMATS`, None by content.
     format: Annotated[
         str | None,
         Option("log.format", "NAME", "Read the log as this format; default: by its content."),
@@ -129,9 +129,9 @@ class ReadChoice(Choice):
     ] = None
     #: The signals that are wanted; None for all. Others may be left unread.
     signals: frozenset[str] | None = None
-    #: Whether the log is only looked at, where a part and a word say more than a refusal.
+    #: Whether the log is only looked at: a part says more than a refusal.
     examining: bool = False
-    #: Whether rows with a value that is no number are left out and said, not refused.
+    #: Whether rows with no number are left out and said, not refused.
     skips_unknown: bool = False
 
     @property
@@ -173,10 +173,7 @@ Episodes = Mapping[int, Callable[[ReadChoice], RawLog]]
 def episode_of(
     path: Path | str, request: ReadChoice, numbers: Sequence[int]
 ) -> "tuple[int, str, tuple[Remark, ...]]":
-    """The number of the episode to read, its name as a part, and remarks.
-
-    It is the one asked for, else the first; an only one has the name "".
-    """
+    """The number of the episode to read, its name as a part, and remarks."""
     from vftcli.signals.remarks import caution
 
     first, count = numbers[0], len(numbers)

@@ -37,13 +37,13 @@ from vftcli.signals.errors import LogError
 from vftcli.signals.remarks import fact
 from vftcli.signals.wrench import WrenchFrame
 
-UR = FORMATS["ur-csv"]  #: The columns of UR's real-time data exchange, whoever wrote them.
+UR = FORMATS["ur-csv"]  #: The columns of UR's real-time data exchange.
 #: Cycle of a CB3 controller, which its time stamps count; an e-Series has 2 ms. [s]
 CB3_CYCLE = 8e-3
 #: What only a controller with a sensor on the flange sends.
 E_SERIES_FIELD = "ft_raw_wrench_0"
 BLOCK_ROWS = 1 << 16  #: Rows of arrays that are read at a time.
-WIDEST = 200  #: Columns beyond which a table without a header is not looked through.
+WIDEST = 200  #: Most columns of a table without a header.
 
 
 def from_table(

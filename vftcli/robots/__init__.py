@@ -99,7 +99,7 @@ def load_robot(robot: "str | Path | Robot", *, tip: str = "") -> "Robot":
     )
 
 
-DECLARED = "log"  #: Value of ``--payload``: what the controller knows of, as the log says.
+DECLARED = "log"  #: Value of ``--payload``: the controller's, as the log says.
 
 
 class RobotChoice(Choice):
@@ -162,7 +162,7 @@ class RobotChoice(Choice):
                     "(damping, frictionloss); this robot's description gives none"
                 )
             return replace(robot, friction=robot.simulated_friction)
-        return robot.without_friction() if self.friction == "none" else robot
+        return replace(robot, friction=()) if self.friction == "none" else robot
 
     def check(self) -> None:
         """Load the robot that is named, if one is, with its payload."""

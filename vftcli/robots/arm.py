@@ -36,12 +36,12 @@ class TreeJoint:
     axis: Array = field(default_factory=lambda: np.array([1.0, 0.0, 0.0]))
     #: Fields of `vftcli.robots.robot.Limits` that the description gives.
     limits: Mapping[str, float] = field(default_factory=dict)
-    follows: str = ""  #: The joint that this one follows, "" where it moves by itself.
+    follows: str = ""  #: The joint that it follows, or "".
     multiplier: float = 1.0  #: How far it goes of the other's position.
     offset: float = 0.0  #: Where it is when the other is at zero. [rad or m]
     rotor_inertia: float = 0.0  #: Reflected rotor inertia. [kg·m²]
-    damping: float = 0.0  #: Viscous friction that a simulator uses. [N·m·s/rad]
-    dry_friction: float = 0.0  #: Dry friction that a simulator uses. [N·m]
+    damping: float = 0.0  #: A simulator's viscous friction. [N·m·s/rad]
+    dry_friction: float = 0.0  #: A simulator's dry friction. [N·m]
 
     @property
     def turns(self) -> bool:
@@ -68,7 +68,7 @@ class BodyTree:
 
     name: str  #: The robot's name.
     path: Path
-    bodies: Mapping[str, Body]  #: Each link's inertia, `NO_BODY` where it gives none.
+    bodies: Mapping[str, Body]  #: Each link's inertia, or `NO_BODY`.
     joints: Sequence[TreeJoint]
     gravity: Array  #: Gravity in the root's axes. (3,) [m/s²]
 
@@ -151,7 +151,7 @@ class BodyTree:
 
 #: Joints that an arm has at least before what it branches into may be a hand.
 BEFORE_A_HAND = 4
-HAND = 0.25  #: Share of the arm's mass that a finger stays below, with all that it carries.
+HAND = 0.25  #: Share of the arm's mass that a finger with its load stays below.
 LISTED = 12  #: Names that a message lists.
 shortened = partial(listed, most=LISTED)
 #: What a flange is called, with or without a robot's prefix; the first that is there.
@@ -166,7 +166,7 @@ class LumpedArm:
     """An arm of a tree with everything else locked."""
 
     tree: BodyTree
-    tip: str = ""  #: The link or joint that the arm ends at, "" for the longest arm.
+    tip: str = ""  #: Link or joint at its end, "" for the longest arm.
     #: Position of each joint that is held whatever it is, by name. [rad or m]
     angles: Mapping[str, float] = field(default_factory=dict)
 

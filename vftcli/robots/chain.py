@@ -33,7 +33,7 @@ class Payload(Shown):
     """A rigid load on the flange."""
 
     mass: float  #: Mass. [kg]
-    com: Array  #: Centre of mass in flange axes, from the flange origin. (3,) [m]
+    com: Array  #: Centre of mass in the flange frame. (3,) [m]
     #: Tensor about it, in flange axes; zero for a point. (3, 3) [kg·m²]
     inertia: Array = field(default_factory=lambda: np.zeros((3, 3)))
 
@@ -229,7 +229,7 @@ def kinematics(
     return [end @ start for end, start in zip(after, [*before, tip], strict=True)], after[1:]
 
 
-POSES = 4096  #: Samples at a time: their matrices stay in the processor's memory.
+POSES = 4096  #: Samples at a time, for the cache.
 
 
 def along(R: Array, columns: Array) -> Array:
@@ -281,10 +281,7 @@ def points_on(poses: Pose, link: Indices | int, share: Array | float) -> Array:
 
 
 def link_jacobian(poses: Pose, link: int, share: float = 1.0) -> Array:
-    """Jacobian of a point along a link, in base axes. (T, 6, n)
-
-    The last link ends at the flange. Columns of joints that do not move the point are zero.
-    """
+    """Jacobian of a point along a link, the last to the flange, base axes. (T, 6, n)"""
     axes = poses.rotation[:, :-1, :, 2].transpose(2, 1, 0)
     places = poses.translation[:, :-1].transpose(2, 1, 0)
     (a, b, c), (x, y, z) = axes, points_on(poses, link, share).T[:, None] - places

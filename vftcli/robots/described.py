@@ -70,7 +70,7 @@ def load_described(path: Path, tip: str, arguments: Sequence[str]) -> Robot:
         what = CONVERSIONS.get(root.tag, other)
         raise RobotError(f"{path}: not a URDF, xacro or MJCF: {what}")
     tree = READERS[root.tag](path, root)
-    stem = path  # the TOML beside it has its name without all endings of descriptions
+    stem = path  # without all endings of descriptions
     while stem.suffix.lower() in DESCRIPTIONS:
         stem = stem.with_suffix("")
     beside = stem.with_name(f"{stem.name}.toml")
@@ -220,8 +220,8 @@ DECLARED = re.compile(r"<xacro:arg\s[^>]*?name\s*=\s*[\"']([^\"']+)[\"']")
 USED = re.compile(r"\$\(arg\s+([^)\s]+)\s*\)")
 #: Time of a processor in which a xacro must be expanded; large ones take below one. [s]
 SECONDS = 10
-WAITED = 6  #: How many times as long it may take where others keep the processors busy.
-MEMORY = 1 << 30  #: Memory in which it must be expanded; large ones take a tenth. [B]
+WAITED = 6  #: How many times as long it may take on busy processors.
+MEMORY = 1 << 30  #: Memory for it; large ones take a tenth. [B]
 
 
 class GuardedBuilder(ET.TreeBuilder):

@@ -142,10 +142,7 @@ def bent_line(
 
 
 class FrictionModel(NamedTuple):
-    """A law of friction, and its keys in ``[joints.friction]``.
-
-    Beside these every model may have `PRESLIDING` and a temperature law; "points" has lists.
-    """
+    """A law of friction, and its keys in ``[joints.friction]``."""
 
     torque: Callable[..., Array]  #: Friction of velocities and the keys' numbers.
     required: tuple[str, ...]  #: Keys that it must have.
@@ -199,10 +196,7 @@ def lawless(law: Sequence[float]) -> str:
 
 
 def friction_factor(friction: Sequence[JointFriction], temperature: Array) -> Array | None:
-    """Factor of each joint's friction, None where none has a law. (T, n) [1]
-
-    It is 1 where a temperature [°C] is NaN, not measured, as at the reference temperature.
-    """
+    """Factor of friction, 1 where T [°C] is NaN; None if none has a law. (T, n) [1]"""
     if not any(joint.temperature for joint in friction):
         return None
     factor = np.ones(temperature.shape, order="F")
@@ -255,10 +249,7 @@ def friction_torque(
 
 
 def steady_torque(friction: JointFriction, dq: Array) -> Array:
-    """One joint's friction in steady sliding, without what fades. [N·m]
-
-    Presliding friction is fully deflected, at the numbers' own temperature.
-    """
+    """One joint's friction in steady sliding, without what fades. [N·m]"""
     absent = dict.fromkeys({"offset", "stribeck"} & friction.parameters.keys(), 0.0)
     steady, v = (replace(friction, parameters={**friction.parameters, **absent}),), dq[:, None]
     return friction_torque(steady, v, deflection=np.sign(v))[:, 0]
@@ -336,7 +327,7 @@ PUSHED_SHARE = 0.6
 NEAR_REST_SHARE = 0.6 / 1.96
 
 
-BLOCK = 32  #: Samples in a block: the Python loop has this length, once a level.
+BLOCK = 32  #: Samples in a block, the length of a Python loop.
 
 
 class Play(NamedTuple):

@@ -49,7 +49,7 @@ from vftcli.signals.pose import cross, skew
 
 #: Samples at a time: more than some 6000 gain nothing. Blocks of a long log hold whole chunks.
 CHUNK = 8192
-KEPT = 4  #: Programs that are kept, some 5 MB each: those of the arm in hand.
+KEPT = 4  #: Programs that are kept, some 5 MB each.
 #: A rotation's entry, or an inertia's share, that counts as zero.
 ROUNDING = 1e-15
 

@@ -25,24 +25,20 @@ FORMATS = {
     ".stl": "model/stl",
 }
 COLOURED = (".dae", ".glb")  #: Those that hold colours.
-LARGEST = 1 << 26  #: The files of one arm together; most arms have a tenth of it. [B]
+LARGEST = 1 << 26  #: All files of an arm; most have a tenth. [B]
 ABOVE = 5  #: Folders above the file in which packages are looked for.
-FARTHEST = 1e6  #: Corners are nearer to their origin, in the unit of their file.
+FARTHEST = 1e6  #: Corners are nearer to their origin.
 #: The unit of a DAE, and the axis that it calls up.
 UNIT = re.compile(rb"(<unit\b[^>]*?\bmeter\s*=\s*[\"'])([^\"']*)")
 UP = re.compile(rb"(<up_axis>\s*)[XY]_UP")
 CORNER = re.compile(rb"\bvertex\s+(\S+)\s+(\S+)\s+(\S+)")  #: A corner in an STL of text.
 #: A triangle in an STL of bytes.
 FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("more", "<u2")])
-NAME = re.compile(r"<name>\s*([^<\s]+)\s*</name>")  #: The name of a package in its manifest.
+NAME = re.compile(r"<name>\s*([^<\s]+)\s*</name>")  #: A package's name in its manifest.
 
 
 def meshes_of(arm: LumpedArm, root: ET.Element) -> tuple[Mesh, ...]:
-    """The meshes that the links of a URDF name.
-
-    Of a link those for show, or where not all of them are found those for collisions.
-    `root` is the first element of the URDF.
-    """
+    """Meshes of a URDF's links: for show if all are found, else for collisions."""
     asked = any("package://" in mesh.get("filename", "") for mesh in root.iter("mesh"))
     # A package's name is in its `package.xml`, else its folder's.
     above = reversed(arm.tree.path.resolve().parents[:ABOVE])

@@ -42,9 +42,9 @@ class JointFriction(Shown):
     parameters: Mapping[str, float] = field(default_factory=dict)
     speeds: tuple[float, ...] = ()  #: Speeds of the model "points", rising. [rad/s]
     torques: tuple[float, ...] = ()  #: Friction at these speeds. [N·m]
-    #: p₁ to p₄ of friction's temperature law (`vftcli.robots.friction`); empty without one.
+    #: p₁ to p₄ of the temperature law (`vftcli.robots.friction`), or empty.
     temperature: tuple[float, ...] = ()
-    #: Joint temperature at which the model's numbers hold, None where nobody says. [°C]
+    #: Joint temperature of the model's numbers, None if not stated. [°C]
     temperature_at: float | None = None
     confidence: str = ""  #: Where the numbers come from, in words.
 
@@ -97,7 +97,7 @@ class Mesh(NamedTuple):
     """The shape of a part of the arm, in a file."""
 
     name: str  #: The file as the description names it.
-    file: Path | None  #: The file, None where there is none that can be drawn.
+    file: Path | None  #: The file, None without one to draw.
     link: int  #: The joint that moves it, from 1; 0 on the base.
     pose: Pose  #: Its pose in the chain's frame of that joint.
     scale: Array  #: Its size, as a factor along each of its axes. (3,)
@@ -121,10 +121,10 @@ class Robot(Shown):
     friction: tuple[JointFriction, ...] = ()  #: One model a joint.
     limits: Limits  #: Joint limits.
     noise: SensorNoise  #: Measurement noise.
-    sample_rate_hz: float = float("nan")  #: The vendor's own rate, NaN if not given. [Hz]
+    sample_rate_hz: float = float("nan")  #: The vendor's rate, or NaN. [Hz]
     #: ROS 2 message of its whole state, "" for JointState alone.
     ros_state: str = ""
-    #: Names of joints that turn on and on: their positions may be logged within a turn.
+    #: Joints that turn on and on: positions may be logged within a turn.
     endless: tuple[str, ...] = ()
     #: The joints' friction in a simulator's description, for ``model.friction=model``, or
     #: empty.
@@ -138,7 +138,7 @@ class Robot(Shown):
     tools: Mapping[str, Pose] = field(default_factory=dict)
     #: Poses of force/torque sensors in the flange frame, likewise.
     sensors: Mapping[str, Pose] = field(default_factory=dict)
-    #: The parameters of ``[admittance]``, as the file has them; empty without any.
+    #: The parameters of ``[admittance]``, as the file has them.
     admittance: Mapping[str, Any] = field(default_factory=dict)
     #: Where the file's numbers come from: keys id, what and ref, in words.
     sources: tuple[Mapping[str, Any], ...] = ()
@@ -146,9 +146,9 @@ class Robot(Shown):
     published: Mapping[str, Any] = field(default_factory=dict)
     #: The whole parsed robot file, for writing a changed one.
     document: Mapping[str, Any] = field(default_factory=dict)
-    remarks: tuple[Remark, ...] = ()  #: What a user of the numbers should know.
-    path: Path | None = None  #: The file it was loaded from, None for one made in memory.
-    meshes: tuple[Mesh, ...] = ()  #: Shapes of its parts; none where only joints are known.
+    remarks: tuple[Remark, ...] = ()  #: What a user should know.
+    path: Path | None = None  #: The file it was loaded from, or None.
+    meshes: tuple[Mesh, ...] = ()  #: Shapes of its parts, if known.
 
     def __post_init__(self) -> None:
         n = self.joints
@@ -214,10 +214,6 @@ class Robot(Shown):
                 )
             payload = self.payloads[payload]
         return replace(self, payload=payload)
-
-    def without_friction(self) -> "Robot":
-        """The robot without friction model, for ``model.friction=none``."""
-        return replace(self, friction=())
 
 
 class FlangeSolver:

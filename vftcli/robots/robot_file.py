@@ -119,7 +119,7 @@ BOUNDS: dict[str, Bound] = {
         "alpha theta rpy ee_rpy": either_way(4.0 * math.pi, "rad"),
         "q_min q_max": either_way(1e4, "rad"),  # a joint may turn on and on, as a winch does
         "mass": Bound(0.0, 1e4, "kg"),
-        "inertia": either_way(1e6, "kg·m²"),  # the heaviest body at a tenth of the longest lever
+        "inertia": either_way(1e6, "kg·m²"),  # the heaviest body on a tenth of a lever
         "rotor_inertia": Bound(0.0, 1e4, "kg·m²"),  # a 1 kg·m² rotor behind a gear of 100
         "torque_constant": Bound(TINY, 1e5, "N·m/A"),  # 100 N·m/A behind a gear of 1000
         "gravity": either_way(100.0, "m/s²"),  # four times Jupiter's
@@ -145,7 +145,7 @@ BOUNDS: dict[str, Bound] = {
     }.items()
     for key in keys.split()
 }
-UNNAMED = either_way(1e6, "")  #: The bound of a number with a key that is not listed.
+UNNAMED = either_way(1e6, "")  #: The bound of any other number.
 #: Least moving mass: the lightest servos weigh some grams. [kg]
 LIGHTEST = 0.05
 

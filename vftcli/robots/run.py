@@ -37,14 +37,11 @@ BULKY = (*SERIES[1:], "smooth_dq", "coarse")
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Run(Shown):
-    """A recording, or a part of one, with its robot's model evaluated.
-
-    Less an error of its model it is a run again.
-    """
+    """A recording, or a part of one, with its robot's model evaluated."""
 
     recording: Recording
     robot: Robot  #: The arm, its payload mounted.
-    #: Whether `terms` come from the paper's numeric method; equal to a millionth.
+    #: Whether `terms` come from the paper's numeric method.
     literal: bool = False
 
     @cached_property
@@ -251,10 +248,7 @@ def paired(recording: Recording, robot: Robot) -> Recording:
 
 
 def unwound(recording: Recording, robot: Robot) -> Recording:
-    """The recording without jumps of a turn in the positions of endless joints.
-
-    A change by more than half a turn between two samples is a wrapped position.
-    """
+    """The recording without jumps of a turn in the positions of endless joints."""
     endless, changed = np.isin(robot.chain.names, robot.endless), {}
     if not endless.any():
         return recording
@@ -283,10 +277,7 @@ def places(logged: Sequence[str], joints: Sequence[str]) -> tuple[int, ...] | No
 
 
 def prefixed(logged: Sequence[str], joints: Sequence[str]) -> tuple[int, ...] | None:
-    """The places of joints with equal names in a log behind a prefix.
-
-    None without one, and where several prefixes fit: two arms.
-    """
+    """Places of joints with equal names behind a prefix, None unless one prefix fits."""
     there, wanted = list(map(plain, logged)), list(map(plain, joints))
     # What all of the robot's names share up to a separator says nothing of a joint.
     heads = (wanted[0][: k + 1] for k, letter in enumerate(wanted[0]) if letter == "_")

@@ -176,7 +176,7 @@ def literal_momentum_terms(model: Any, q: Array, dq: Array) -> MomentumTerms:  #
 
 #: Rounding of a speed, or of a number of blocks up to 1e6 s.
 TIE = 1e-6
-GAP = 5.5  #: A step of more than this many median steps is a gap; no stretch reaches across.
+GAP = 5.5  #: A longer step, in median steps, is a gap; no stretch reaches across.
 
 
 def raw_disturbance(terms: DynamicsTerms) -> Array:
@@ -190,10 +190,7 @@ def raw_disturbance(terms: DynamicsTerms) -> Array:
 
 
 def disturbance_impulse(terms: DynamicsTerms) -> Array:
-    """The raw disturbance's integral, pᵗ − p⁰ − ∫μ. (T, n) [N·m·s]
-
-    A difference of two of its values over the time between them is the mean of d there.
-    """
+    """The raw disturbance's integral, pᵗ − p⁰ − ∫μ. (T, n) [N·m·s]"""
     total = empty_series(*terms.p.shape)
     total[:1] = 0.0
     gained = raw_disturbance(terms) * np.diff(terms.t)[:, None]
@@ -208,8 +205,8 @@ class Blocks(NamedTuple):
     length: Array  #: How long it lasts. (K,) [s]
     d: Array  #: Mean disturbance over it. (K, n) [N·m]
     q: Array  #: Joint positions at its middle. (K, n) [rad]
-    velocity: Array  #: Mean joint velocity over it, from the positions. (K, n) [rad/s]
-    known: Mask  #: Whether its disturbance is known: not across a gap of the clock. (K,)
+    velocity: Array  #: Mean velocity, from the positions. (K, n) [rad/s]
+    known: Mask  #: Whether d is known: not across a gap. (K,)
 
     @property
     def rests(self) -> Mask:

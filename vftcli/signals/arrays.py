@@ -141,7 +141,7 @@ def rms_of_known(x: Array) -> Array:
     return np.sqrt(np.where(count > 0, total / np.maximum(count, 1), np.nan))
 
 
-EVEN = 1e-6  #: Largest share by which steps of an even clock, stamps of nine digits, differ.
+EVEN = 1e-6  #: Share by which an even clock's steps differ: stamps of nine digits.
 
 
 def is_uniform(t: Array, tolerance: float = EVEN) -> bool:
@@ -159,7 +159,7 @@ def is_uniform(t: Array, tolerance: float = EVEN) -> bool:
 class Clock(NamedTuple):
     """Sampling of a log."""
 
-    uniform: bool  #: Whether all steps are equal, so that constant coefficients are exact.
+    uniform: bool  #: Whether all steps are equal.
     step: float  #: Nominal sample time. [s]
 
 

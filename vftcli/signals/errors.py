@@ -43,7 +43,7 @@ class UnsettledRobotError(RobotError):
 
     def __init__(self, message: str, recording: object) -> None:
         super().__init__(message)
-        self.recording: Any = recording  #: The log, of which a command prints what it holds.
+        self.recording: Any = recording  #: The log.
 
 
 class ParameterError(VftError):

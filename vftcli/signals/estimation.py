@@ -187,7 +187,7 @@ def cross_validated(A: Array, y: Array, weights: Array, parts: Sequence[Array]) 
 SPIKE = 40.0  #: Variance of a spike, in variances of the innovation.
 #: A state of no larger predicted variance is certain: nothing is carried back to it.
 LEAST_VARIANCE = 1e-14
-STRETCH = 512  #: Blocks for which innovations and gains back are computed at once.
+STRETCH = 512  #: Blocks that are computed at once.
 
 
 class LinearModel(NamedTuple):
@@ -205,7 +205,7 @@ class FilteredBlock(NamedTuple):
 
     mean: Array  #: State given the blocks up to this one. (…, N)
     covariance: Array  #: (…, N, N)
-    predicted: Array  #: Covariance before the block's own d is used. (…, N, N)
+    predicted: Array  #: Covariance before its own d. (…, N, N)
     square: Array  #: νᵀS⁻¹ν of the innovation, as if it were no spike. (…)
     spread: Array  #: Its covariance S, as if it were no spike. (…, n, n)
 
@@ -253,10 +253,7 @@ def log_likelihood(model: LinearModel) -> Array:
 
 
 def smoothed(model: LinearModel) -> tuple[Array, Array]:
-    """Mean and covariance of every block given all of them. (K, …, N), (K, …, N, N)
-
-    The gain C = P F (P⁻)⁻¹ is solved on states of variance above `LEAST_VARIANCE`.
-    """
+    """Mean and covariance of every block given all of them. (K, …, N), (K, …, N, N)"""
     decay, size = model.decay, model.decay.shape[-1]
     mean, covariance = np.empty(decay.shape), np.empty((*decay.shape, size))
     predicted = np.empty_like(covariance)

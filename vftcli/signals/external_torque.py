@@ -39,8 +39,8 @@ class DynamicsTerms(Shown):
     p: Array  #: Generalised momentum M q̇. (T, n) [kg·m²/s]
     #: μ = τ + Cᵀq̇ − g − F_f, the torque that changes p without contact. (T, n) [N·m]
     mu: Array
-    log_clock: Clock | None = None  #: The whole log's clock where these are a block of it.
-    before: Instant | None = None  #: The sample before the first of a later block of a log.
+    log_clock: Clock | None = None  #: The whole log's clock, of a block.
+    before: Instant | None = None  #: The sample before a later block.
 
     def __post_init__(self) -> None:
         seal(self, "t", "p", "mu")
@@ -107,19 +107,19 @@ def one_sample_earlier(terms: DynamicsTerms, name: str) -> Array:
 class ExternalTorque(TimeSeries):
     """Torque the environment exerts on the robot, positive along each joint axis."""
 
-    name: str  #: Short name of the observer or the reference, as in tables and columns.
+    name: str  #: Name of the observer or the reference, as in tables.
     t: Array  #: Time on the recording's clock. (T,) [s]
     tau: Array  #: External torque; NaN where it is not known. (T, n) [N·m]
     #: One SD of `tau` by the estimator's own account. (T, n) [N·m]
     sd: Array | None = None
-    #: Root-mean-square error that the estimate itself is known to have. (n,) [N·m]
+    #: RMS error that the estimate is known to have. (n,) [N·m]
     floor: Array | None = None
     #: One deviation of `tau`, model error and lag included, in single
     #: precision; None where no free part is known. (T, n) [N·m]
     error_sd: Array | None = None
-    #: Whether the joint moves: at rest stiction hides torque. None if not known. (T, n)
+    #: Whether the joint moves: at rest stiction hides torque. (T, n)
     moving: Mask | None = None
-    remarks: tuple[Remark, ...] = ()  #: What a reader of the numbers should know.
+    remarks: tuple[Remark, ...] = ()  #: What a reader should know.
 
     def __post_init__(self) -> None:
         seal(self, "t", "tau")

@@ -124,10 +124,7 @@ def refuse_mostly_gap(t: Array, step: float) -> None:
 
 @lru_cache
 def butterworth(step: float, cutoff: float | tuple[float, float], order: int = ORDER) -> Array:
-    """Second-order sections of a Butterworth filter of even order. (S, 6)
-
-    A low pass has one cutoff, a band pass two edges [Hz].
-    """
+    """Sections of a Butterworth low pass, or of a band pass' two edges [Hz]. (S, 6)"""
     if not (np.all(np.asarray(cutoff) > 0) and np.all(np.asarray(cutoff) < 0.5 / step)):
         raise ParameterError(
             f"a filter at {cutoff} Hz is not possible on a log of {1.0 / step:.4g} Hz; "

@@ -113,10 +113,7 @@ def parabola(before: float, here: float, after: float) -> float:
 
 
 def bridge_unknown(t: Array, x: Array) -> Array:
-    """Columns with a straight line across unknown samples. (T, n)
-
-    At the ends the nearest known value is held; a column without any becomes zero.
-    """
+    """Columns with a straight line across unknown samples, zero if all are. (T, n)"""
     columns = []
     for column in x.T:
         known = np.isfinite(column)
@@ -167,10 +164,7 @@ class LagFit(NamedTuple):
 
 
 def lag_fit(late: Array, early: Array, least: float) -> LagFit:
-    """Fit of two series (M, k), (N, k) of one step at every lag.
-
-    At least the share `least` of the shorter one must overlap.
-    """
+    """Fit of series (M, k), (N, k) where a share `least` of the shorter overlaps."""
     # Without a common offset sums of squares keep their digits.
     middle = late.mean(axis=0)
     x, y = late - middle, early - middle

@@ -53,12 +53,12 @@ class Option(NamedTuple):
 
     #: As typed, ``-v/--details``; "" of an argument; dotted of a setting.
     name: str
-    metavar: str  #: What its value is called, "" of an option that is given or not.
+    metavar: str  #: Its value's name, "" of an option without one.
     help: str  #: What it means; the short help shows the first sentence.
-    #: What makes the field's value of the typed text, None where that is the value.
+    #: What makes the value of the typed text; None: it is the value.
     reads: Callable[[Any], Any] | None = None
     several: bool = False  #: Whether it may be repeated.
-    group: str = ""  #: The heading under which it is listed, "" for the command's own.
+    group: str = ""  #: Its heading, "" for the command's own.
     least: float | None = None  #: Smallest number allowed.
     most: float | None = None  #: Largest number allowed.
     #: What a shell offers for its value; None for the words of `metavar`.
@@ -178,10 +178,7 @@ class Choice:
         settings: Mapping[str, str] = MappingProxyType({}),
         **words: Any,  # noqa: ANN401 - texts, numbers, lists of them
     ) -> Self:
-        """The choice that words and settings state; None and [] state nothing.
-
-        Settings of other choices are left out.
-        """
+        """The choice that words and its own settings state; None and [] state nothing."""
         options, values = cls.options(), {}
         own = {name: text for name, text in settings.items() if cls.takes(name)}
         words |= {name: own.pop(name) for name in options if name in own}
@@ -214,7 +211,7 @@ C = TypeVar("C", bound=Choice)
 class Asked(NamedTuple):
     """The options of a command or a call, as typed."""
 
-    words: Mapping[str, Any]  #: Word of an option → what was given for it, None for nothing.
+    words: Mapping[str, Any]  #: Word of an option → what was given, or None.
     settings: Mapping[str, str]  #: Name → text of the settings.
     line: str  #: The command or call, as `run.json` holds it.
 

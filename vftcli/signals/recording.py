@@ -44,10 +44,7 @@ class Cut(NamedTuple):
 
 
 class Awaited:
-    """A field that may be given as a function, called when it is first read.
-
-    A digest is computed in the background; only who writes it down waits.
-    """
+    """A field that may be given as a function, called when it is first read."""
 
     def __set_name__(self, _owner: type, name: str) -> None:
         self._key = f"_{name}"
@@ -75,21 +72,21 @@ class Source(Shown):
     label: str = ""
     format: str = "memory"  #: The reader's name.
     columns: str = ""  #: What ``--columns`` said of it, "" for nothing.
-    #: Hex digest of the file's bytes, of a folder's files in name order; reading it may wait.
+    #: Hex digest of the file, of a folder's in name order; reading it may wait.
     sha256: Awaited = Awaited()
     clock: str = "as given"  #: Which clock the stamps are from, in words.
     t0: float = 0.0  #: The log's own stamp of the first sample. [s]
     #: The same stamp in whole nanoseconds where the log counts them. [ns]
     t0_ns: int | None = None
     rows: int = 0  #: Samples the file held before any were dropped.
-    duplicates: int = 0  #: Rows dropped because their stamp repeated the one before.
+    duplicates: int = 0  #: Rows dropped as they repeat a stamp.
     #: Signals that were made of others here and stand in no log.
     derived: tuple[str, ...] = ()
-    #: Facts on what was dropped, turned or derived; cautions and warnings on what looks wrong.
+    #: What was dropped, turned or derived, and what looks wrong.
     remarks: tuple[Remark, ...] = ()
     #: Which of several recordings, as "episode 3"; "" for the only one.
     part: str = ""
-    cuts: tuple[Cut, ...] = ()  #: Samples that were cut out because no arm can have made them.
+    cuts: tuple[Cut, ...] = ()  #: Samples that no arm can have made.
     #: The sample that each row is or repeats, −1 for none; None if each is its own. (rows,)
     row_samples: Indices | None = field(default=None, compare=False, repr=False)
 
@@ -165,8 +162,8 @@ class Recording(TimeSeries):
     wrench: Array | None = None
     #: What the log states of `wrench`; None where it states nothing.
     wrench_frame: WrenchFrame | None = None
-    joint_names: tuple[str, ...] = ()  #: The joints' names in the log's order, or empty.
-    robot_hint: str | None = None  #: Name of the profile the log itself settles, or None.
+    joint_names: tuple[str, ...] = ()  #: The joints' names, or empty.
+    robot_hint: str | None = None  #: The profile that it settles, or None.
     #: Mass of the payload that the controller knows, None if not logged. [kg]
     payload_mass: float | None = None
     #: Its centre of mass in flange axes. (3,) [m]

@@ -41,7 +41,7 @@ class Where(NamedTuple):
 
     #: An observer, log or file by its name; "" where it is the run as a whole.
     about: str = ""
-    joints: tuple[int, ...] = ()  #: Joints, counted from 1; none where it holds for all alike.
+    joints: tuple[int, ...] = ()  #: Joints, from 1; none for all alike.
     #: First and last time, None where it holds throughout. [s]
     span: tuple[float, float] | None = None
 

@@ -116,7 +116,12 @@ def drawn_in(x: Array, least: Array | float, peak: float) -> tuple[Array, Mask]:
     rows = rows[(rows >= NEAR) & (rows < len(x) - NEAR)]
     around = np.arange(-NEAR, NEAR + 1)
     for ends, far in ((made, limit), (made[::-1], limit[::-1])):
-        ends[:NEAR] = at_an_end(ends[: 3 * NEAR], END * far[:NEAR])
+        # A line of median slope and place through the log's end.
+        slope = np.median(np.diff(ends[: 3 * NEAR], axis=0), axis=0)
+        level = ends[: 3 * NEAR] - np.arange(3 * NEAR)[:, None] * slope
+        each = (np.median(np.delete(level, k, axis=0), axis=0) for k in range(NEAR))
+        line = np.array([place + k * slope for k, place in enumerate(each)])
+        ends[:NEAR] = drawn_to(line, line, ends[:NEAR], END * far[:NEAR])
     # The worst of its neighbours first: beside a bad sample others look bad.
     for _ in range(NEAR):
         near = np.sort(made[rows[:, None] + around], axis=1)
@@ -129,14 +134,6 @@ def drawn_in(x: Array, least: Array | float, peak: float) -> tuple[Array, Mask]:
         drawn = drawn_to(near[:, NEAR], others, made[rows], far)
         made[rows] = np.where(beyond[rows] >= worst, drawn, made[rows])
     return made, abs(made - x) > 0.0
-
-
-def at_an_end(x: Array, limit: Array) -> Array:
-    """The first samples, drawn to a line of median slope and place through the log's end."""
-    slope = np.median(np.diff(x, axis=0), axis=0)
-    level = x - np.arange(len(x))[:, None] * slope
-    line = [np.median(np.delete(level, k, axis=0), axis=0) + k * slope for k in range(NEAR)]
-    return drawn_to(np.array(line), np.array(line), x[:NEAR], limit)
 
 
 def drawn_to(middle: Array, place: Array, x: Array, limit: Array) -> Array:

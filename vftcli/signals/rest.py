@@ -20,8 +20,8 @@ HELD, WINDOW = 1e-3, 0.2  #: Way up to which a joint is held [rad], and within h
 #: Shorter stops are reversals, which the friction model's account of them covers. [s]
 LEAST = 0.25
 BREAKAWAY = 0.1  #: Time around a stop in which the joint settles or breaks away. [s]
-AROUND = 0.15  #: Time before and after a sample that says whether the joint rests in it. [s]
-NEAR_REST = 0.3  #: Stiction counts this long around a rest too, where no free part tells. [s]
+AROUND = 0.15  #: Time around a sample that says whether the joint rests. [s]
+NEAR_REST = 0.3  #: Stiction counts so long around a rest, without a free part. [s]
 
 
 def slower(dq: Array, speed: float = REST) -> Mask:
@@ -52,10 +52,7 @@ def standing(t: Array, dq: Array) -> Mask:
 
 
 def resting(t: Array, dq: Array) -> Mask:
-    """Where a joint is slower than `REST` in most of the time around. (T, n)
-
-    Unlike `standing` it has no shortest stop.
-    """
+    """Where a joint is slower than `REST` in most of the time around. (T, n)"""
     first = t.searchsorted(t - AROUND, side="left")
     last = t.searchsorted(t + AROUND, side="right")
     rests = np.zeros(dq.shape, bool)

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     import polars as pl
 
 LONGEST = 160  #: Letters of a line at most.
-FEW = 7  #: An array of so many numbers, one a joint, is shown; of a larger one its shape.
+FEW = 7  #: Most numbers of an array that are shown; of a larger one its shape.
 ALL = slice(None)  #: All rows of a table.
 UNKNOWN = "–"  #: The text for a number that is not known.
 

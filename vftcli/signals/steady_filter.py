@@ -21,10 +21,10 @@ from vftcli.signals.arrays import Array, Indices, empty_series
 #: Samples handled at a time, to bound memory; blocks of a log that begin at multiples of it
 #: give the whole log's numbers to the last bit.
 PIECE = 1 << 14
-FORGOTTEN = 1e-20  #: Share of a state that counts as nothing: far below its last digit.
+FORGOTTEN = 1e-20  #: Share of a state that counts as nothing.
 #: Samples in a block, a power of two: more work, fewer blocks.
 BLOCK = 32
-LENGTH = 36  #: Most samples in a block of `recursion`, the length of its Python loops.
+LENGTH = 36  #: Most samples in a block of `recursion`.
 
 
 def filtered(
@@ -104,12 +104,9 @@ def blocks_of(F: Array, g: Array, wanted: Array) -> tuple[Array, Array, Array, A
 
 
 class Fold(NamedTuple):
-    """A piece of a log as position in block × joint × block.
+    """A piece of a log as position in block × joint × block, for all blocks at once."""
 
-    Every operation then runs along many blocks at once.
-    """
-
-    length: int  #: Samples in a block; the last one is filled up with its last sample.
+    length: int  #: Samples in a block; the last one is filled up.
     samples: int  #: Samples of the piece.
 
     @classmethod

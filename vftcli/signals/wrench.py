@@ -34,7 +34,7 @@ class WrenchFrame:
 
     #: base, flange, tool or sensor; or a frame that only the log knows.
     axes: str
-    point: str  #: What its moment refers to: a key of `POINTS`, or again the log's own name.
+    point: str  #: Point of its moment: a key of `POINTS`, or the log's own.
     sign: Sign = "on-robot"  #: On or by the robot.
 
     @classmethod
@@ -98,7 +98,7 @@ def per_axis(name: str, values: Array) -> Iterator[tuple[str, Array]]:
 class Wrench(TimeSeries):
     """Force and moment that the environment exerts on the robot."""
 
-    name: str  #: Short name of the observer or of the reference it comes from.
+    name: str  #: Name of the observer or of the reference.
     t: Array  #: Time on the recording's clock. (T,) [s]
     #: Force, then moment, even where the pose leaves them open: see `known`. (T, 6) [N, N·m]
     values: Array
@@ -106,10 +106,10 @@ class Wrench(TimeSeries):
     sd: Array | None = None  #: One SD of `values`. (T, 6) [N, N·m]
     #: Least singular value of J, angular rows × .3 m; None: no J. (T,) [m]
     sigma_min: Array | None = None
-    masked: Mask | None = None  #: Samples in which the pose cannot tell the wrench. (T,)
+    masked: Mask | None = None  #: Where the pose cannot tell it. (T,)
     #: Norm of the torque that no flange wrench explains; None for six joints. (T,) [N·m]
     null_space: Array | None = None
-    remarks: tuple[Remark, ...] = ()  #: What a reader of the numbers should know.
+    remarks: tuple[Remark, ...] = ()  #: What a reader should know.
 
     def __post_init__(self) -> None:
         seal(self, "t", "null_space")

@@ -156,10 +156,7 @@ def observe(arm: Arm) -> Simulation:
 
 
 def simulate_pair(scenario: Scenario, seed: int | None = None) -> list[Simulation]:
-    """An experiment's run, and if it is one of a pair the free run of the same arm.
-
-    The free run has the same arm and motion, no payload and no contacts; its noise differs.
-    """
+    """An experiment's run, and if it is one of a pair the free run of the same arm."""
     run = simulate(scenario, seed)
     if not scenario.pair:
         return [run]

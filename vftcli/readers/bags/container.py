@@ -22,8 +22,8 @@ class Channel(NamedTuple):
     """One topic of one container."""
 
     topic: str
-    type: str  #: Message type as package/Name, without the middle part that ROS 2 writes.
-    encoding: str  #: How its messages are serialised: ros1, cdr, json, protobuf, or other.
+    type: str  #: Message type as package/Name, without ROS 2's middle part.
+    encoding: str  #: ros1, cdr, json, protobuf, or other.
     #: Text of the message definition, or nothing if the container has none.
     definition: str = ""
     idl: bool = False  #: Whether the definition is in IDL.
@@ -67,7 +67,7 @@ class MessageCount:
 
     end: int  #: Where its last whole record ends. [B]
     kept: int = 0
-    counted: int | None = None  #: Messages that it counts, None where it does not say.
+    counted: int | None = None  #: Messages by its own count, or None.
 
     def report(self, budget: "ReadBudget", counter: str, *, cut: bool) -> None:
         """Say so if messages are missing by its own count, or may be as it is cut."""

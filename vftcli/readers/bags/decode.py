@@ -68,7 +68,7 @@ class MessageLayout:
         self.texts: dict[str, Names] = {}
         self._types, self._message, self._cdr = types, message, cdr
         self._order, self._position, self._visits = "<", 0, 0
-        #: Ranges of bytes that have to be equal for a message to have this layout.
+        #: Ranges of bytes that all messages of this layout have.
         self._fixed: list[tuple[int, int]] = []
         if cdr:  # four bytes: representation and byte order
             if len(message) < 4 or message[0] != 0 or message[1] > 1:
@@ -156,7 +156,7 @@ class MessageLayout:
         )
 
 
-@lru_cache(maxsize=64)  # many channels may share one definition, and parsing takes its time
+@lru_cache(maxsize=64)  # many channels may share one definition
 def types_of(definition: str, name: str, *, idl: bool) -> Types:
     """Parse a message definition with rosbags' parsers. Type → fields."""
     from rosbags.typesys import TypesysError, get_types_from_idl, get_types_from_msg
@@ -387,7 +387,7 @@ class Decoder:
                     raise LayoutError(f"its messages have more than {LAYOUTS} layouts")
             fits = known[tried].fits(messages)
             if fits.any():
-                own = slice(None) if fits.all() else fits  # which copies none
+                own = slice(None) if fits.all() else fits
                 numbers = partial(known[tried].numbers, messages[own])
                 self.add(channel, numbers, known[tried].texts, places[own])
             messages, places, tried = messages[~fits], places[~fits], tried + 1

@@ -176,7 +176,15 @@ def mcap_messages(file: LogFile, budget: ReadBudget) -> Messages:
                 schemas[schema.id] = schema
             elif kind == Opcode.CHANNEL:
                 given = McapChannel.read(ReadDataStream(BytesIO(body)))
-                channels[given.id] = _channel(given, schemas[given.schema_id])
+                schema, encoding = schemas[given.schema_id], given.message_encoding
+                known = schema.encoding in {"ros1msg", "ros2msg", "ros2idl"}
+                channels[given.id] = Channel(
+                    topic=printable(given.topic),
+                    type=(type_name if known else printable)(schema.name),
+                    encoding=encoding if encoding in ENCODINGS else "other",
+                    definition=schema.data.decode("utf-8", "replace") if known else "",
+                    idl=schema.encoding == "ros2idl",
+                )
             elif kind == Opcode.STATISTICS:
                 counts.counted = struct.unpack_from("<Q", body)[0]
             elif kind == Opcode.DATA_END:
@@ -188,17 +196,6 @@ def mcap_messages(file: LogFile, budget: ReadBudget) -> Messages:
                 cut = counts.counted is None and struct.unpack_from("<Q", body)[0] > data_end
                 break
     counts.report(budget, "its statistics", cut=cut)
-
-
-def _channel(given: McapChannel, schema: Schema) -> Channel:
-    known = schema.encoding in {"ros1msg", "ros2msg", "ros2idl"}
-    return Channel(
-        topic=printable(given.topic),
-        type=type_name(schema.name) if known else printable(schema.name),
-        encoding=given.message_encoding if given.message_encoding in ENCODINGS else "other",
-        definition=schema.data.decode("utf-8", "replace") if known else "",
-        idl=schema.encoding == "ros2idl",
-    )
 
 
 ZSTD = b"\x28\xb5\x2f\xfd"

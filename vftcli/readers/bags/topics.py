@@ -172,10 +172,7 @@ class Gathering:
         return frame if said.unit is None else WrenchFrame.parsed(said.unit)
 
     def interpolate(self, stream: Stream, signal: str) -> bool:
-        """Whether a signal of another topic was interpolated at the leading times.
-
-        It is held at the ends. A remark says where the topic does not cover them.
-        """
+        """Whether a signal of another topic was interpolated at the leading times."""
         lead, topic = self.lead, stream.topic
         times, own, values = lead.host, stream.host, stream.signals[signal]
         # One of the two may have receive stamps only: like is compared with like.

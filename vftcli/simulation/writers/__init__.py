@@ -97,10 +97,7 @@ AT_CONTACT = "base axes, moment about the point that is touched"
 
 
 def vendor_signals(simulation: Simulation) -> dict[str, NDArray[Any]]:
-    """Signals of vendors' tables by name. (M, …) each
-
-    With no tool set the TCP is the flange.
-    """
+    """Signals of vendors' tables by name, the TCP at the flange. (M, …) each"""
     import pinocchio as pin
 
     samples, signals = simulation.samples, simulation.measured.signals

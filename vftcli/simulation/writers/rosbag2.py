@@ -40,11 +40,7 @@ Topic = tuple[str, str, dict[str, Value]]
 
 
 def write_rosbag2(path: Path, simulation: Simulation) -> None:
-    """Write the log as a bag folder.
-
-    Effort is the motor current for a UR arm, in ampere, as its driver has it. A flange
-    sensor is a second topic, WrenchStamped in the sensor's frame.
-    """
+    """Write the log as a bag folder."""
     from rosbags.rosbag2 import StoragePlugin, Writer
 
     rows, signals = simulation.measured.rows, simulation.measured.signals
