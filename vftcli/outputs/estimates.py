@@ -90,6 +90,7 @@ def write_groups(path: Path, groups: Iterable[Group], csv: Path | None = None) -
 
     The whole table would not fit in memory beside the log.
     """
+    from pyarrow import Table
     from pyarrow.parquet import ParquetWriter
 
     # Measured numbers hardly repeat: a dictionary costs time and room.
@@ -113,7 +114,8 @@ def write_groups(path: Path, groups: Iterable[Group], csv: Path | None = None) -
                 if csv is not None:
                     text = files.enter_context(csv.open("wb"))
                     table.clear().write_csv(text)
-            writer.write_table(table.to_arrow().cast(schema))
+            arrays = table.to_arrow().columns
+            writer.write_table(Table.from_arrays(arrays, schema=schema))
             if csv is not None:
                 table.write_csv(text, include_header=False, float_precision=9)
     return analysis
