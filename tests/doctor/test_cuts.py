@@ -90,6 +90,9 @@ def examined(recording: Recording) -> tuple[Recording, dict[str, Any]]:
         (changed("q", 1, lambda x: x - 0.3, 3), "position-slip", 1, (3,)),
         (changed("dq", 1, lambda x: x + 2, 3), "isolated-velocity", 1, (3,)),
         (changed("dq", 1, lambda x: x + 10, 3), "isolated-velocity", 1, (3,)),
+        # Four samples of 0.4 rad/s at rest are 5 N·m·s that no force gave.
+        (changed("dq", 4, lambda x: x + 0.4, 3), "isolated-velocity", 4, (3,)),
+        (changed("dq", 25, lambda x: x + 0.4), "isolated-velocity", 25, None),
         # .25 s before and behind, and the two samples between which it is: 64 at 125 Hz.
         (changed("q", 9999, lambda x: x + 0.05, 3), "position-jump", 64, (3,)),
         (glued, "position-jump", 64, None),

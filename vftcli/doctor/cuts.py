@@ -14,7 +14,7 @@ from vftcli.doctor.signals import WAY, repeated_rows, stuck_stretches, travel_of
 from vftcli.doctor.velocity import GAP_STEPS
 from vftcli.robots.robot import Robot
 from vftcli.robots.terms import effort_name, gravity_torque
-from vftcli.signals.arrays import Array, Indices, Mask, covered, median, runs_of
+from vftcli.signals.arrays import Array, Indices, Mask, covered, median, runs_of, summed
 from vftcli.signals.recording import EFFORTS, Cut, Recording
 from vftcli.signals.remarks import Remark, Where, fact, on_joints, warning
 from vftcli.signals.rest import REST
@@ -27,6 +27,9 @@ AWAY, FAR = 0.5, 25.0
 FAST = 0.25  #: `AWAY` for velocities, by the joint's largest speed. [1]
 #: Most such samples in a row, and their time; more may be a blow. [-, s]
 FEW, BRIEF = 3, 0.03
+#: Window of velocities against positions [s], least mean difference and jump [rad/s], and
+#: largest lag of a sound velocity [s].
+WHILE, ASTRAY, JUMP, LAG = 0.04, 0.03, 0.08, 0.02
 #: Bend of a joint's speed across such samples that shows a blow. [rad/s]
 BLOW = 0.05
 #: Share of a joint's largest torque from which no effort jumps to exactly 0. [1]
@@ -55,6 +58,11 @@ class Bad(NamedTuple):
     #: By how much, in the unit of the finding's words; None without one. (T, n)
     sizes: Array | None = None
     most: float = SHARE  #: Most of the log to cut for it. [1]
+
+
+#: The sample before each change of position beyond the velocities (K,), sizes (K, n) [rad],
+#: and the jumps among them (K, n).
+Slips = tuple[Indices, Array, Mask]
 
 
 def without_bad_samples(recording: Recording, robot: Robot) -> Recording:
@@ -102,9 +110,11 @@ def rules(recording: Recording, robot: Robot) -> Iterator[Bad]:
     """Bad samples of a log, rule by rule."""
     dq, step, frozen = recording.require("dq"), recording.median_step, frozen_rows(recording)
     yield Bad("frozen-rows", frozen[:, None], None, MOST)
-    yield from position_jumps(recording, frozen)
+    slips = slips_of(recording)
+    yield from position_jumps(recording, frozen, slips)
     fast = FAST * np.nan_to_num(robot.limits.qd_max, nan=2.0)
-    yield Bad("isolated-velocity", isolated(dq, fast, step), dq)
+    alone = isolated(dq, fast, step) | not_followed(recording, slips)
+    yield Bad("isolated-velocity", alone, dq)
     name = effort_name(recording, robot)
     effort: Array | None = getattr(recording, name)
     constant = np.ones(robot.joints) if name != "current" else robot.torque_constant
@@ -150,6 +160,34 @@ def isolated(x: Array, away: Array, step: float) -> Mask:
     return found
 
 
+def not_followed(recording: Recording, slips: Slips) -> Mask:
+    """Velocities with jumps that the positions do not follow over `WHILE`. (T, n)"""
+    t, q, step = recording.t, recording.q, recording.median_step
+    dq, found = recording.require("dq"), np.zeros(q.shape, bool)
+    width = min(max(round(WHILE / step), 4), (len(t) - 1) // 3)
+    at, _, jumps = slips
+    span = t[width:] - t[:-width]
+    even = abs(span - width * step) < 0.5 * width * step
+    for j in np.flatnonzero([abs(np.diff(column)).max() > JUMP for column in dq.T]):
+        moved = (q[width:, j] - q[:-width, j]) / span
+        total = summed(0.5 * (dq[1:, j] + dq[:-1, j]) * np.diff(t))
+        off = abs((total[width:] - total[:-width]) / span - moved)
+        # Stamps may be off by a step, and a velocity late.
+        around = np.pad(moved, width, mode="edge")
+        turn = abs(around[2 * width :] - around[: -2 * width])
+        slack = ASTRAY + (abs(moved) * (step + abs(span - width * step)) + LAG * turn) / span
+        bad = even & (off > np.maximum(slack, FAR / 0.6745 * median(off)))
+        for k in at[jumps[:, j]].tolist():
+            bad[max(k - width, 0) : k + 1] = False
+        for start, stop in runs_of(bad):
+            some = slice(start, stop + width)
+            if abs(np.diff(dq[some, j])).max() > JUMP:
+                middle = t[width // 2 :][: len(moved)]
+                rest = abs(dq[some, j] - np.interp(t[some], middle, moved))
+                found[some, j] = rest > 0.5 * rest.max()
+    return found
+
+
 def blows(dq: Array, rows: Mask) -> Mask:
     """Samples across which a joint's speed bends as in a blow. (T,)"""
     found = np.zeros(len(dq), bool)
@@ -190,11 +228,8 @@ def frozen_rows(recording: Recording) -> Mask:
     return covered(list(zip(first[frozen] + 1, last[frozen] + 1, strict=True)), len(t))
 
 
-def slips_of(recording: Recording) -> tuple[Indices, Array, Mask]:
-    """Changes of position beyond the velocities, and the jumps among them.
-
-    The sample before each (K,), sizes (K, n) [rad] and jumps (K, n). Stamps may be off.
-    """
+def slips_of(recording: Recording) -> Slips:
+    """Changes of position beyond the velocities; stamps may be off."""
     q, dq = recording.q, recording.require("dq")
     steps, usual = np.diff(recording.t), recording.median_step
     large, noise = np.zeros(len(steps), bool), np.zeros(recording.joints)
@@ -230,9 +265,9 @@ def without_turns(recording: Recording) -> Recording:
     return replace(recording, q=recording.q - shift.cumsum(axis=0), source=source)
 
 
-def position_jumps(recording: Recording, frozen: Mask) -> Iterator[Bad]:
+def position_jumps(recording: Recording, frozen: Mask, changes: Slips) -> Iterator[Bad]:
     """Rows off the motion, and the time around where recordings meet."""
-    steps, slips, jumps = slips_of(recording)
+    steps, slips, jumps = changes
     real = jumps.any(axis=1) & ~(frozen[steps] | frozen[steps + 1])
     steps, slips, jumps = steps[real], slips[real], jumps[real]
     if not steps.size or steps.size > max(2.0, SHARE * recording.samples):
