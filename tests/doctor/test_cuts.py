@@ -16,6 +16,7 @@ from vftcli.robots import load_robot
 from vftcli.robots.kernels import momentum_terms
 from vftcli.signals.arrays import Array
 from vftcli.signals.recording import Recording
+from vftcli.signals.repairs import with_velocity
 
 FIXTURES = Path(__file__).parents[2] / "fixtures"
 ROBOT = load_robot("ur5")
@@ -111,6 +112,18 @@ def test_bad_samples_are_cut_out_and_said_once(circle, plant, code, rows, joints
     where = bad.t[min(AT, bad.samples - 1)] if plant is not glued else bad.t[AT - 190]
     assert cut.start - 0.01 <= where <= cut.stop + 0.01
     assert not np.isin(sound.t, bad.t[(bad.t >= cut.start) & (bad.t <= cut.stop)]).any()
+
+
+@pytest.mark.parametrize("rows", [1, 3])
+def test_a_bad_position_is_in_no_derived_velocity(circle, rows):
+    """Spread by the filter, three samples of .5 rad gave a real log a contact of 15 kN."""
+    bare = replace(circle, dq=None)
+    bad = planted(bare, changed("q", rows, lambda x: x + 0.5, 3))
+    sound, found = examined(with_velocity(bad))
+    assert found["position-slip"].values["rows"] == rows
+    at = np.isin(bare.t, sound.t)
+    # The missing samples' part in the filter: .5 rad would give 5 rad/s.
+    np.testing.assert_allclose(sound.dq, with_velocity(bare).dq[at], rtol=0, atol=0.02)
 
 
 @pytest.mark.parametrize("rows", [1, 9999], ids=["one sample", "from then on"])

@@ -17,6 +17,7 @@ from vftcli.robots.terms import effort_name, gravity_torque
 from vftcli.signals.arrays import Array, Indices, Mask, covered, median, runs_of, summed
 from vftcli.signals.recording import EFFORTS, Cut, Recording
 from vftcli.signals.remarks import Remark, Where, fact, on_joints, warning
+from vftcli.signals.repairs import derived_velocity
 from vftcli.signals.rest import REST
 
 #: Multiple of its largest torque that no drive gives. [1]
@@ -84,7 +85,11 @@ def without_bad_samples(recording: Recording, robot: Robot) -> Recording:
             if bad.sizes is not None:
                 size = abs(bad.sizes[start:stop][here]).max()
             cuts.append(Cut(bad.code, first, last, stop - start, joints, size))
-    return log.without(rows, cuts) if cuts and np.count_nonzero(~rows) > 2 else log
+    if not cuts or np.count_nonzero(~rows) < 3:
+        return log
+    left = log.without(rows, cuts)
+    # A filter has spread what is cut out.
+    return replace(left, dq=derived_velocity(left)[0]) if left.source.derived else left
 
 
 def cut_findings(recording: Recording) -> Iterator[Remark]:

@@ -34,21 +34,26 @@ RATE = 50.0  #: Rate from which velocities are derived without being asked for. 
 def with_velocity(recording: Recording, slowest: float = 0.0) -> Recording:
     """A log with velocities derived from its positions, if it has none.
 
-    dq = the gradient of q on the log's own stamps, low-passed without phase shift; none
-    of a log below the rate `slowest` [Hz].
+    A log below the rate `slowest` [Hz] gets none.
     """
     if recording.dq is not None or recording.samples < 3:
         return recording
     if recording.median_step * slowest > 1.001:
         return recording
+    dq, cutoff = derived_velocity(recording)
+    said = caution("derived-velocity", cutoff_Hz=cutoff, blunted_ms=1e3 * BLUNTED / cutoff)
+    changed = recording.changed(said, dq=dq)
+    return replace(changed, source=replace(changed.source, derived=("dq",)))
+
+
+def derived_velocity(recording: Recording) -> tuple[Array, float]:
+    """The gradient of q on the log's own stamps, low-passed both ways, and the cutoff. [Hz]"""
     cutoff = min(CUTOFF, OF_NYQUIST * 0.5 / recording.median_step)
     # Endless joints logged within one turn jump; a motor's count does not.
     within = np.ptp(recording.q, axis=0) < ONE_TURN
     q = np.where(within, np.unwrap(recording.q, axis=0), recording.q)
     slopes = np.gradient(q, recording.t, axis=0)
-    said = caution("derived-velocity", cutoff_Hz=cutoff, blunted_ms=1e3 * BLUNTED / cutoff)
-    changed = recording.changed(said, dq=low_pass(recording.t, slopes, cutoff))
-    return replace(changed, source=replace(changed.source, derived=("dq",)))
+    return low_pass(recording.t, slopes, cutoff), cutoff
 
 
 #: A sample is compared with so many before it and so many behind it, by their median.
