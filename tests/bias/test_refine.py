@@ -10,7 +10,7 @@ from sound_logs import UR10E
 
 from vftcli.bias import AUTOMATIC, RefinementChoice
 from vftcli.bias.baseline import Baseline, Baselines, baseline_of, free_reading
-from vftcli.bias.refine import STICTION, band_remarks, friction_share, limits_remark, with_band
+from vftcli.bias.refine import STICTION, friction_share, limits_remark, refine, with_band
 from vftcli.bias.whole_log import WholeLogBias, stride_of
 from vftcli.evaluation.references import paper_gap
 from vftcli.free_motion import FreeChoice
@@ -57,8 +57,10 @@ def test_without_spectra_or_free_samples_there_is_none(found, reading):
     assert with_band(replace(found, spectra=None), reading).error_sd is None
     nothing = reading._replace(samples=reading.samples[:0], resting=reading.resting[:0])
     assert with_band(found, nothing).error_sd is None
-    said = band_remarks(replace(found, part=None, spectra=None))
-    assert [r.code for r in said] == ["no-band"]
+    bare = replace(found, part=None, spectra=None)
+    both = Baselines(plain=bare, best=bare)
+    said = refine(both, [reading.observer], [reading.estimate]).remarks
+    assert [r.code for r in said if "band" in r.code] == ["no-band"]
 
 
 def test_the_larger_of_what_is_stated_and_what_a_fit_calls_free_counts(found, reading):

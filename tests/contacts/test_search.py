@@ -12,7 +12,6 @@ from vftcli.contacts.search import (
     filtered_contacts,
     split_at_turns,
     split_run,
-    turned_round,
     two_state_odds,
 )
 from vftcli.contacts.windows import WindowWrench
@@ -30,7 +29,9 @@ def joints_of(d: Array) -> tuple[Blocks, Array]:
 
 
 def both_ways(log: Blocks, joints: int = 1) -> tuple[ErrorProcess, ErrorProcess]:
-    return error_process(noise(joints), log), error_process(noise(joints), turned_round(log))
+    back = log.part(slice(None, None, -1))
+    back = back._replace(t=-back.t, velocity=-back.velocity)
+    return error_process(noise(joints), log), error_process(noise(joints), back)
 
 
 def pushed(count: int, seed: int) -> Array:

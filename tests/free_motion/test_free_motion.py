@@ -64,9 +64,9 @@ def test_the_cycle_that_is_named_is_the_one_taken(circle):
 
 @pytest.mark.parametrize("cycle", [0, 6])
 def test_cycles_that_are_not_there(circle, cycle):
-    assert motion_of(circle, choice=FreeChoice(cycles=(1, 5))).cycles_given == (0, 4)
+    assert motion_of(circle, choice=FreeChoice(cycles=(1, 5))).free_cycles.numbers == (0, 4)
     with pytest.raises(ReferenceTorqueError, match=f"no cycle {cycle}; the log holds 5 whole"):
-        _ = motion_of(circle, choice=FreeChoice(cycles=(1, cycle))).cycles_given
+        _ = motion_of(circle, choice=FreeChoice(cycles=(1, cycle))).free_cycles
 
 
 def test_an_arm_that_only_yields_has_no_free_cycle_but_those_named(circle):

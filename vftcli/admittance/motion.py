@@ -287,23 +287,15 @@ def follow(robot: Robot, start: Array, x: Array, period: float) -> JointPath:
             else:
                 # Straight on from the two poses before.
                 guess = 2.0 * last - before if good else last
-                found, good = try_pose(solver, goal, point, guess, last)
+                found, good = last, False
+                if np.isfinite(point).all():
+                    found, good = solver.reach(goal, point, guess)
+                    if not good or abs(found - last).max() > LARGEST_STEP:
+                        found, good = solver.reach(goal, point, last)
                 last, before = found, last if good else found
                 shown = found if good else shown
             q[k, i], reached[k, i] = shown, good
     return JointPath(q, reached, largest_speed(robot, q, reached, period))
-
-
-def try_pose(
-    solver: FlangeSolver, rotation: Array, point: Array, guess: Array, last: Array
-) -> tuple[Array, bool]:
-    """Joints at a pose, from a guess or, if it leaps, from `last`. (n,)"""
-    if not np.isfinite(point).all():
-        return last, False
-    found, good = solver.reach(rotation, point, guess)
-    if good and abs(found - last).max() <= LARGEST_STEP:
-        return found, True
-    return solver.reach(rotation, point, last)
 
 
 def largest_speed(robot: Robot, q: Array, reached: Mask, period: float) -> Array:

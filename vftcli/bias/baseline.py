@@ -63,14 +63,6 @@ class Baseline:
             self._made.clear()
 
     @property
-    def tunable(self) -> Spectra | None:
-        """The spectra if gains may come from them, else None.
-
-        Not from a fit's free part with a load: 2.8 kg on a UR10e gave the slowest gains.
-        """
-        return None if self.by_fit and self.load is not None else self.spectra
-
-    @property
     def correction_sd(self) -> Array | None:
         """Deviation of the model's error, None without a correction. (T, n) [N·m]"""
         return None if self.correction is None else self.correction.sd
@@ -147,12 +139,16 @@ class Baselines:
 
     def spectra(self, *, gains: bool) -> LogSpectra:
         """Spectra for the observers built for the log."""
-        plain = self.plain.tunable
+        # Not of a fit's free part with a load: 2.8 kg on a UR10e gave the slowest gains.
+        plain, best = (
+            None if one.by_fit and one.load is not None else one.spectra
+            for one in (self.plain, self.best)
+        )
         called_for = None
         if gains and plain is not None:
             least = tune_all(plain, Goal("auto"))
             called_for = {line.section: dict(line.gains) for line in least}
-        return LogSpectra(plain=plain, best=self.best.tunable, gains=called_for)
+        return LogSpectra(plain=plain, best=best, gains=called_for)
 
 
 class FreeReading(NamedTuple):

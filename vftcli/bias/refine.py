@@ -83,14 +83,6 @@ def stated_band(found: Baseline, called: FreeError | None) -> Array:
     )
 
 
-def band_remarks(found: Baseline) -> list[Remark]:
-    """Meaning of the bands, and joints without known friction."""
-    if found.spectra is None:
-        return [caution("no-band")] if found.part is None else []
-    stuck = caution("band-of-a-standing-joint", on_joints(found.stuck))
-    return [fact("band"), stuck] if found.stuck.any() else [fact("band")]
-
-
 def budget(found: Baseline, spectra: Spectra, reading: FreeReading) -> dict[str, Array]:
     """RMS of an observer's error by each cause, estimated from the log. (n,) [N·m]
 
@@ -172,7 +164,12 @@ def refine(
         least = {"expected_rmse_Nm": curve.least}
         remarks.append(fact("tuned", Where(name), omega_n_rad_s=curve.best, **least))
         remarks += bound_remarks(name, curve.best, curve.omega_n)
-    remarks += band_remarks(plain)
+    if plain.spectra is not None:
+        remarks.append(fact("band"))
+        if plain.stuck.any():
+            remarks.append(caution("band-of-a-standing-joint", on_joints(plain.stuck)))
+    elif plain.part is None:
+        remarks.append(caution("no-band"))
     remarks += [limits_remark(name, each, plain.stuck) for name, each in causes.items()]
     return Refinement(
         estimates=tuple(shown),

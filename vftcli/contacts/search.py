@@ -111,8 +111,9 @@ def search(run: Run, noise: TorqueNoise, level: Array, seconds: float) -> Candid
     blocks = disturbance_blocks(run.terms, run.q, seconds)
     options = places(run.robot.loaded_chain, blocks.q)
     flange, J = options[0].jacobian, flange_jacobian(run.robot.loaded_chain, blocks.q)
-    ahead = error_process(noise, blocks)
-    inside = filtered_contacts(blocks, (ahead, error_process(noise, turned_round(blocks))), J)
+    ahead, back = error_process(noise, blocks), blocks.part(slice(None, None, -1))
+    back = back._replace(t=-back.t, velocity=-back.velocity)
+    inside = filtered_contacts(blocks, (ahead, error_process(noise, back)), J)
     spans = np.reshape(runs_of(beyond_threshold(run, level)), (-1, 2)).astype(int)
     # The observer lags by 1/gain.
     first, last = blocks.t.searchsorted(run.t[spans - [0, 1]] - 1.0 / GAIN).T
@@ -139,12 +140,6 @@ def search(run: Run, noise: TorqueNoise, level: Array, seconds: float) -> Candid
     pieces = [piece for pair in pairs for piece in split_run(blocks.t, *pair, J)]
     passed = [any(a < stop and b > start for a, b in beyond) for start, stop in pieces]
     return Candidates(log, options, pieces, evidence(log, options, pieces, prior), passed, prior)
-
-
-def turned_round(blocks: Blocks) -> Blocks:
-    """The blocks of the log played backward."""
-    turned = blocks.part(slice(None, None, -1))
-    return turned._replace(t=-turned.t, velocity=-turned.velocity)
 
 
 def filtered_contacts(

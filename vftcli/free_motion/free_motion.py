@@ -138,8 +138,8 @@ class FreeMotion(Shown):
         return segment(recording, find_period(recording, self.choice.period))
 
     @cached_property
-    def cycles_given(self) -> tuple[int, ...]:
-        """Cycles that you name free, or inside a free span, from 0."""
+    def free_cycles(self) -> FreeCycles:
+        """Free cycles: those you name or that lie inside a free span, else those found."""
         cycles, whole = self.cycles, self.cycles.whole
         for number in self.choice.cycles:
             if not 1 <= number <= whole:
@@ -152,16 +152,11 @@ class FreeMotion(Shown):
             begin, end = cycles.span(number)
             if any(begin >= a - slack and end <= b + slack for a, b in self.choice.spans):
                 found.add(number)
-        return tuple(sorted(found))
-
-    @cached_property
-    def free_cycles(self) -> FreeCycles:
-        """Free cycles of the log: the user's, else those found."""
-        if self.cycles_given:
-            return FreeCycles(self.cycles_given, None)
-        found = find_free_cycles(self.log.coarse, self.cycles)
+        if found:
+            return FreeCycles(tuple(sorted(found)), None)
+        freest = find_free_cycles(self.log.coarse, cycles)
         self.log.spare()
-        return found
+        return freest
 
     @cached_property
     def known(self) -> FreePart:

@@ -143,9 +143,25 @@ def controller_models(recordings: Sequence[Recording], robot: Robot) -> Iterator
             f"robot {robot.name!r} has no torque constants, so its log has no target currents to "
             "read a model off; use --method friction or base"
         )
-    each = [targets_of(recording, robot) for recording in recordings]
-    for recording, log in zip(recordings, each, strict=True):
+    each = list[ControllerTargets]()
+    for recording in recordings:
+        current, moment = (recording.require(f"target_{name}") for name in ("current", "torque"))
+        motion, smooth = (
+            prepare(recording, robot, CUTOFF),
+            zero_phase(recording.t, moment, CUTOFF),
+        )
+        log = ControllerTargets(
+            logs=(motion,),
+            dq=motion.dq,
+            ddq=motion.ddq,
+            current=motion.filtered(current),
+            moment=smooth[motion.kept],
+            lead=derivative(recording.t, smooth)[motion.kept],
+            rigid=motion.rigid,
+            gravity=gravity_torque(robot, motion.q),
+        )
         refuse_guided(recording, log, robot)
+        each.append(log)
     motions, *signals = zip(*each, strict=True)
     every = ControllerTargets(sum(motions, ()), *map(np.concatenate, signals))
     for j, before in enumerate(robot.torque_constant):
@@ -154,23 +170,6 @@ def controller_models(recordings: Sequence[Recording], robot: Robot) -> Iterator
         K = min(ways, key=lambda k: k.sd / abs(k.value) if k.sd < np.inf else np.inf)
         friction = controller_friction(j, every, K.value if K.known else before)
         yield ControllerModel(K, rotor_inertia(j, every), friction)
-
-
-def targets_of(recording: Recording, robot: Robot) -> ControllerTargets:
-    """Targets beside the motion of one log."""
-    current, moment = recording.require("target_current"), recording.require("target_torque")
-    motion = prepare(recording, robot, CUTOFF)
-    smooth = zero_phase(recording.t, moment, CUTOFF)
-    return ControllerTargets(
-        logs=(motion,),
-        dq=motion.dq,
-        ddq=motion.ddq,
-        current=motion.filtered(current),
-        moment=smooth[motion.kept],
-        lead=derivative(recording.t, smooth)[motion.kept],
-        rigid=motion.rigid,
-        gravity=gravity_torque(robot, motion.q),
-    )
 
 
 def constant_at_rest(j: int, log: ControllerTargets) -> Estimate:
