@@ -22,7 +22,7 @@ GARBAGE = 3e19
 def made(stamps: Any, q: Any, **more: Any) -> Recording:
     signals = {"q": np.asarray(q)} | more.pop("signals", {})
     log = RawLog(stamps=np.asarray(stamps), clock="test", signals=signals, **more)
-    return cleaned(log, Path("log"), "test")
+    return cleaned(log, Path("log"), "test", ReadChoice())
 
 
 @pytest.mark.parametrize(

@@ -3,6 +3,7 @@
 SciPy reads MATLAB's version 5, h5py its 7.3: variables, or one level of structs.
 """
 
+import re
 import warnings
 import zipfile
 import zlib
@@ -187,7 +188,18 @@ MATLAB_NUMBERS = {
 
 def _read_matlab(file: LogFile, request: ReadChoice) -> RawLog:
     """A .mat file's log; joints × samples are turned by the time's length, with a remark."""
-    variables = _matlab_73(file) if file.head.startswith(V73) else _matlab_5(file)
+    if not file.head.startswith(V73):
+        variables = _matlab_5(file)
+    else:
+        with opened(file) as content:
+            table = table_of(file.path, content, fewest_rows=1)
+            there = {k: n for k, n in enumerate(table.names) if not n.startswith("#")}
+            table.check_size(list(there))
+            # MATLAB writes column by column, which HDF5 reads as rows.
+            variables = {
+                name.replace("/", "."): table.load([k], k if _is_clock(name) else None)[k].T
+                for k, name in there.items()
+            }
     if not variables:
         raise LogError(f"{file.path}: a MATLAB file without variables of numbers, so no log.")
     level = "" if request.spec.item("q") else level_of(file.path, list(variables), ".")
@@ -208,45 +220,14 @@ def _read_matlab(file: LogFile, request: ReadChoice) -> RawLog:
 
 
 def _is_clock(name: str) -> bool:
-    return name.rpartition(".")[2].lower() in CLOCKS
-
-
-def _matlab_73(file: LogFile) -> Columns:
-    with opened(file) as content:
-        table = table_of(file.path, content, fewest_rows=1)
-        names = {
-            k: n.replace("/", ".") for k, n in enumerate(table.names) if not n.startswith("#")
-        }
-        table.check_size(list(names))
-        # MATLAB writes column by column, which HDF5 reads as rows.
-        return {
-            name: table.load([k], k if _is_clock(name) else None)[k].T
-            for k, name in names.items()
-        }
+    return re.split("[./]", name)[-1].lower() in CLOCKS
 
 
 def _matlab_5(file: LogFile) -> Columns:
     """A version 5 file's variables of numbers; those of structs as struct.name."""
-    _check_matlab(file)
     from scipy.io import loadmat, whosmat
 
-    stream: Any = BytesIO(file.content)
-    with naming_damage(file.path, "a damaged MATLAB file", zlib.error), warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # of what is left out
-        there = [(name, shape) for name, shape, kind in whosmat(stream) if kind in MATLAB_NUMBERS]
-        claimed = sum(8 * int(np.prod(shape, dtype=object)) for _, shape in there)
-        check_unpacked(file.path, claimed, len(file.content))
-        names = [name for name, _ in there]
-        loaded = loadmat(stream, variable_names=names, simplify_cells=True)
-    return {
-        name: value
-        for name, value in flat(loaded, 1)
-        if isinstance(value, np.ndarray) and value.dtype.kind in "fiub"
-        if value.ndim in {1, 2} and value.size
-    }
-
-
-def _check_matlab(file: LogFile) -> None:
+    # What the packed variables unpack to.
     content, place, total = file.content, HEADER, 0
     limit = unpacked_limit(len(content))
     order: Literal["little", "big"] = "little" if bytes(content[126:128]) == b"IM" else "big"
@@ -264,3 +245,18 @@ def _check_matlab(file: LogFile) -> None:
                 total += len(unpacker.decompress(packed, 1 << 20))
                 packed = unpacker.unconsumed_tail
         check_unpacked(file.path, total, len(content))
+
+    stream: Any = BytesIO(file.content)
+    with naming_damage(file.path, "a damaged MATLAB file", zlib.error), warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of what is left out
+        there = [(name, shape) for name, shape, kind in whosmat(stream) if kind in MATLAB_NUMBERS]
+        claimed = sum(8 * int(np.prod(shape, dtype=object)) for _, shape in there)
+        check_unpacked(file.path, claimed, len(file.content))
+        names = [name for name, _ in there]
+        loaded = loadmat(stream, variable_names=names, simplify_cells=True)
+    return {
+        name: value
+        for name, value in flat(loaded, 1)
+        if isinstance(value, np.ndarray) and value.dtype.kind in "fiub"
+        if value.ndim in {1, 2} and value.size
+    }

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vftcli.readers.reader import RawLog
+from vftcli.readers.reader import RawLog, ReadChoice
 from vftcli.readers.table import joined
 from vftcli.signals.arrays import Array, Indices, Mask, gaps_of, handed_over, median, median_step
 from vftcli.signals.errors import ClockError, LogError
@@ -85,11 +85,9 @@ def cleaned(
     raw: RawLog,
     path: Path,
     format_name: str,
+    choice: ReadChoice,
     sha256: str | Callable[[], str] = "",
     label: str = "",
-    columns: str = "",
-    *,
-    examining: bool = False,
 ) -> Recording:
     """Make a Recording of what a reader found.
 
@@ -98,7 +96,8 @@ def cleaned(
     degrees refused.
     """
     rows = len(raw.stamps) + (0 if raw.unknown is None else len(raw.unknown))
-    before, raw = raw, measured(raw, path, examining=examining)
+    columns = choice.columns or ""
+    before, raw = raw, measured(raw, path, examining=choice.examining)
     if raw.segment != before.segment:
         columns = f"{columns},segment=1".lstrip(",")
     fresh = without_repeats(raw, path)

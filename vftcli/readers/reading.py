@@ -178,9 +178,7 @@ def read_chosen(path: str | Path, choice: ReadChoice, label: str = "") -> Record
     sha256: Callable[[], str] = partial(sha256_of, *(raw.files or (path,)))
     if not raw.part:  # of one of many parts it may never be asked for
         sha256 = ThreadPoolExecutor(1).submit(sha256).result
-    return cleaned(
-        raw, path, reader.name, sha256, label, choice.columns or "", examining=choice.examining
-    )
+    return cleaned(raw, path, reader.name, choice, sha256, label)
 
 
 def episode_numbers(path: str | Path, choice: ReadChoice) -> Sequence[int]:

@@ -61,7 +61,25 @@ def load_profile(path: Path) -> Robot:
     for j, (joint, name) in enumerate(zip(joints, names, strict=True)):
         if name in names[:j]:
             joint.refuse(f"name is {name!r}, as another joint's; each has its own", "name")
-    return assemble(root, joints, build_chain(root, joints, names))
+    convention = root.choice("convention", CONVENTIONS)
+    numbers, vectors = CONVENTIONS[convention]
+    frames: list[dict[str, Any]] = [
+        {key: joint.number(key) for key in numbers}
+        | {key: joint.vector(key, 3) for key in vectors}
+        for joint in joints
+    ]
+    end: dict[str, Any] = {"flange_d": root.number("flange_d", 0.0)}
+    end |= {key: root.vector(key, 3, ORIGIN) for key in ("ee_xyz", "ee_rpy")}
+    placements, inertial_frames = kinematics(convention, frames, end)
+    bodies = [
+        checked_body(joint).moved(frame)
+        for joint, frame in zip(joints, inertial_frames, strict=True)
+    ]
+    if why := weightless(sum(body.mass for body in bodies)):
+        root.refuse(why)
+    rotors, gravity = column(joints, "rotor_inertia", 0.0), root.vector("gravity", 3, UPRIGHT)
+    chain = Chain.of(names, placements, bodies, rotor_inertia=rotors, gravity=gravity)
+    return assemble(root, joints, chain)
 
 
 def assemble(root: Section, joints: Sequence[Section], chain: Chain) -> Robot:
@@ -118,28 +136,6 @@ def check_count(root: Section, key: str, count: int, message: str) -> None:
     stated = root.values.get(key, count)
     if isinstance(stated, bool) or stated != count:
         root.refuse(f"{key} is {shown(stated)}{message}", key)
-
-
-def build_chain(root: Section, joints: Sequence[Section], names: Sequence[str]) -> Chain:
-    """The chain that a file's convention, frames and bodies state."""
-    convention = root.choice("convention", CONVENTIONS)
-    numbers, vectors = CONVENTIONS[convention]
-    frames: list[dict[str, Any]] = [
-        {key: joint.number(key) for key in numbers}
-        | {key: joint.vector(key, 3) for key in vectors}
-        for joint in joints
-    ]
-    end: dict[str, Any] = {"flange_d": root.number("flange_d", 0.0)}
-    end |= {key: root.vector(key, 3, ORIGIN) for key in ("ee_xyz", "ee_rpy")}
-    placements, inertial_frames = kinematics(convention, frames, end)
-    bodies = [
-        checked_body(joint).moved(frame)
-        for joint, frame in zip(joints, inertial_frames, strict=True)
-    ]
-    if why := weightless(sum(body.mass for body in bodies)):
-        root.refuse(why)
-    rotors, gravity = column(joints, "rotor_inertia", 0.0), root.vector("gravity", 3, UPRIGHT)
-    return Chain.of(names, placements, bodies, rotor_inertia=rotors, gravity=gravity)
 
 
 def checked_body(table: Section, default: Sequence[float] | None = None) -> Body:

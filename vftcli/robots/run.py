@@ -273,11 +273,6 @@ def places(logged: Sequence[str], joints: Sequence[str]) -> tuple[int, ...] | No
     """
     if all(logged.count(name) == 1 for name in joints):
         return tuple(logged.index(name) for name in joints)
-    return prefixed(logged, joints) or numbered(logged, joints)
-
-
-def prefixed(logged: Sequence[str], joints: Sequence[str]) -> tuple[int, ...] | None:
-    """Places of joints with equal names behind a prefix, None unless one prefix fits."""
     there, wanted = list(map(plain, logged)), list(map(plain, joints))
     # What all of the robot's names share up to a separator says nothing of a joint.
     heads = (wanted[0][: k + 1] for k, letter in enumerate(wanted[0]) if letter == "_")
@@ -289,9 +284,9 @@ def prefixed(logged: Sequence[str], joints: Sequence[str]) -> tuple[int, ...] | 
         for prefix in prefixes
         if prefix[-1:] in {"", "_"} and all(there.count(prefix + name) == 1 for name in bare)
     ]
-    if len(fits) != 1 or all(name.isdigit() for name in bare):
-        return None
-    return tuple(there.index(fits[0] + name) for name in bare)
+    if len(fits) == 1 and not all(name.isdigit() for name in bare):
+        return tuple(there.index(fits[0] + name) for name in bare)
+    return numbered(logged, joints)
 
 
 def numbered(logged: Sequence[str], joints: Sequence[str]) -> tuple[int, ...] | None:

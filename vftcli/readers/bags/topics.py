@@ -123,15 +123,14 @@ class Gathering:
 
     def take(self, stream: Stream) -> None:
         """Take what another topic has of the same joints, and the leading one has not."""
-        if stream.topic.startswith(OWN):
-            self._take_own(stream)
-        elif stream is not self.lead and same_arm(stream, self.lead):
-            for signal in [s for s in stream.signals if s not in {"effort", *self.signals}]:
-                self.interpolate(stream, signal)
-
-    def _take_own(self, stream: Stream) -> None:
-        """Add a topic of an MCAP by vftcli convert, /vftcli/SIGNAL, sample by sample."""
-        name, lead = stream.topic.removeprefix(OWN), self.lead
+        lead = self.lead
+        if not stream.topic.startswith(OWN):
+            if stream is not lead and same_arm(stream, lead):
+                for signal in [s for s in stream.signals if s not in {"effort", *self.signals}]:
+                    self.interpolate(stream, signal)
+            return
+        # Of an MCAP by vftcli convert, /vftcli/SIGNAL, sample by sample.
+        name = stream.topic.removeprefix(OWN)
         signal = SIGNALS.get(name, name)
         value = stream.signals.get("wrench" if signal == "wrench" else "effort")
         if value is None or signal not in SIGNALS.values():
