@@ -43,11 +43,12 @@ def table_at(path: Path) -> Table:
     return ParquetTable(file) if file.head.startswith(b"PAR1") else TextTable(file)
 
 
-def program_clock(raw: RawLog, path: Path) -> Array:
-    """The stamps of a table that a program made, which must be whole. (T,) [s]"""
+def program_log(table: Table, picks: Picks, choice: ReadChoice) -> RawLog:
+    """The log of a table that a program made, whose clock must be whole. [s]"""
+    raw = load_signals(table, picks, choice)
     t = np.asarray(raw.stamps, dtype=np.float64) * raw.tick
-    check_clock(t, str(path))
-    return t
+    check_clock(t, str(table.path))
+    return replace(raw, stamps=t, tick=1.0)
 
 
 def read_reference(path: Path, columns: str | None = None) -> RawLog:
@@ -67,8 +68,7 @@ def read_reference(path: Path, columns: str | None = None) -> RawLog:
             )
         if (wrench := picks.get("wrench")) and len(wrench.cells) != 6:
             raise LogError(f"{path}: a wrench has 6 columns, not {len(wrench.cells)}.")
-    raw = load_signals(table, picks, ReadChoice(signals=frozenset({TORQUE, "wrench"})))
-    raw = replace(raw, stamps=program_clock(raw, path), tick=1.0)
+    raw = program_log(table, picks, ReadChoice(signals=frozenset({TORQUE, "wrench"})))
     for name, values in raw.signals.items():
         if not np.all(np.isfinite(values)):
             row, column = np.argwhere(~np.isfinite(values))[0]
@@ -97,8 +97,7 @@ def read_outside(path: Path, name: str) -> RawLog:
             f"{path}: estimates have columns t, {TORQUE}/1, {TORQUE}/2 …; it has "
             f"{listed(table.names)}"
         )
-    raw = load_signals(table, picks, ReadChoice())
-    return replace(raw, stamps=program_clock(raw, path), tick=1.0)
+    return program_log(table, picks, ReadChoice())
 
 
 def read_list(path: Path) -> list[tuple[float, float, float, float, bool]]:

@@ -230,12 +230,7 @@ HELD = 1 << 23
 
 
 class JoinedRows:
-    """The rows of a signal, part by part; beyond `HELD` bytes in a file if possible.
-
-    Attributes:
-        count: How many there are so far.
-        shapes: The shapes of single rows.
-    """
+    """The rows of a signal, part by part; beyond `HELD` bytes in a file if possible."""
 
     def __init__(self) -> None:
         self.count, self.shapes = 0, set[tuple[int, ...]]()

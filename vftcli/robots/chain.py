@@ -232,15 +232,6 @@ def kinematics(
 POSES = 4096  #: Samples at a time, for the cache.
 
 
-def along(R: Array, columns: Array) -> Array:
-    """R M for R (3, 3, T) and M (3, k), rounded alike whatever T is. (3, k, T)
-
-    A product of BLAS rounds by the length: a log in pieces would have other last digits.
-    """
-    x, y, z = columns[:, :, None]
-    return np.asarray(x * R[:, :1] + y * R[:, 1:2] + z * R[:, 2:])
-
-
 def link_poses(chain: Chain, q: Array) -> Pose:
     """Poses of joints, then flange, in the base frame for q (T, n) [rad]. (T, n+1)"""
     check_kind(chain, Chain, "the chain", "robot.chain")
@@ -257,7 +248,9 @@ def link_poses(chain: Chain, q: Array) -> Pose:
         cosine, sine = np.cos(q[span].T), np.sin(q[span].T)
         R, o = np.eye(3)[:, :, None], 0.0
         for j, frame in enumerate(frames):
-            x, y, z, step = along(R, frame).swapaxes(0, 1)
+            # A product of BLAS would round by the length, and a log in pieces otherwise.
+            a, b, c = frame[:, :, None]
+            x, y, z, step = (a * R[:, :1] + b * R[:, 1:2] + c * R[:, 2:]).swapaxes(0, 1)
             R, o = rotation[j, :, :, span], o + step
             R[:, 0], R[:, 2] = cosine[j] * x + sine[j] * y, z
             R[:, 1] = cosine[j] * y - sine[j] * x

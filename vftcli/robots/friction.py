@@ -217,14 +217,9 @@ def friction_torque(
 ) -> Array:
     """Friction torque, opposing motion when subtracted. (T, n) [N·m]
 
-    Joint by joint, for the cache. `RunningFriction` follows the presliding state.
-
-    Args:
-        friction: One model a joint; empty for a frictionless arm.
-        dq: Joint velocities. (T, n) [rad/s]
-        load: Gravity torques, None for unloaded joints. (T, n) [N·m]
-        deflection: State s of the play operator; None for undeflected joints. (T, n)
-        temperature: NaN where not measured; None for that of the models. (T, n) [°C]
+    Joint by joint, for the cache, at velocities `dq` [rad/s] and under gravity torques
+    `load` [N·m]; `deflection` is the state s of `RunningFriction`, `temperature` [°C] is
+    NaN where not measured, None for the models' own. (T, n) each
     """
     torque = np.zeros(dq.shape, order="F")
     for j, joint in enumerate(friction):

@@ -163,17 +163,10 @@ def program_of(chain: Chain, wanted: tuple[str, ...]) -> Program:
 def momentum_chunks(
     chain: Chain, q: Array, dq: Array, wanted: tuple[str, ...]
 ) -> Iterator[tuple[slice, Array, list[Array]]]:
-    """Evaluate one chunk of samples after another.
+    """Samples, their velocity and each `wanted` result of `record`, chunk by chunk.
 
-    Args:
-        chain: The arm, its payload merged in.
-        q: Joint positions. (T, n) [rad]
-        dq: Joint velocities. (T, n) [rad/s]
-        wanted: Names of results, as `record` has them.
-
-    Yields:
-        Which samples, their velocity and each result, (N, n) with whole columns; the next chunk's
-        results are written over them.
+    Of q (T, n) [rad], dq (T, n) [rad/s] and a chain with its payload; (N, n) with whole
+    columns, which the next chunk is written over.
     """
     samples, n = q.shape
     if not samples:

@@ -49,12 +49,7 @@ class Operation(NamedTuple):
 
 
 class Tape:
-    """The operations that equations need, in their order.
-
-    Attributes:
-        inputs: Number of given rows; rows of operations are counted on from there.
-        operations: The recorded ones.
-    """
+    """The operations that equations need, in their order, behind the given rows."""
 
     def __init__(self, inputs: int) -> None:
         self.inputs = inputs
@@ -154,11 +149,7 @@ class Program:
         self._samples, self._calls = 0, []  # type: tuple[int, list[tuple[Any, ...]]]
 
     def bind(self, samples: int) -> tuple[Array, Array]:
-        """Make ready to `run` on so many samples.
-
-        Returns:
-            Where the inputs are to be written, and where the outputs will stand. (rows, samples)
-        """
+        """Where `run` reads so many samples' inputs and writes outputs. (rows, samples)"""
         if samples > self._memory.shape[1]:
             self._memory = empty_rows(self._rows, samples)
         if samples != self._samples:

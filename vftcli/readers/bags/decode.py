@@ -57,15 +57,13 @@ def parts_at(paths: Sequence[str], there: Container[str]) -> list[str]:
 class MessageLayout:
     """Where everything lies in serialised messages of one shape, a row of bytes each.
 
-    Attributes:
-        paths: Dotted path → code and count of numbers, and where they begin.
-        texts: Dotted path → strings, one or several.
-        kind: The messages' structure, each number under its dotted path.
+    `kind` is their structure, each number under its dotted path.
     """
 
     def __init__(self, types: Types, message: bytes, kind: str, *, cdr: bool) -> None:
+        #: Dotted path → code and count of numbers, and where they begin.
         self.paths: dict[str, tuple[tuple[str, tuple[int]], int]] = {}
-        self.texts: dict[str, Names] = {}
+        self.texts: dict[str, Names] = {}  #: Dotted path → strings.
         self._types, self._message, self._cdr = types, message, cdr
         self._order, self._position, self._visits = "<", 0, 0
         #: Ranges of bytes that all messages of this layout have.
@@ -279,13 +277,8 @@ TIMES = ("receive", "header", "robot")  #: What a stream has beside its signals.
 class Stream:
     """Messages of one topic about the same joints, part by part and then whole.
 
-    Attributes:
-        channel, topic, kind: The topic, its name, the meaning of its type.
-        names: The joints' names, base to tip, or empty.
-        frame: Frame of its stamps' headers, or nothing.
-        mixed: Whether the messages had the joints in another order, or others among them.
-        constants: Last value of each constant.
-        series: The times and signals that came in, and each message's number among all.
+    `mixed` says whether the messages had other joints or another order; `series` has the
+    times and signals that came in, and each message's number among all.
     """
 
     def __init__(self, channel: Channel, names: Names, frame: str) -> None:
@@ -395,13 +388,10 @@ class Decoder:
     def add(
         self, channel: Channel, numbers: Numbers, texts: Mapping[str, Names], places: Integers
     ) -> None:
-        """Take up messages of one shape.
+        """Take up messages of one shape, of a type in `KINDS`.
 
-        Args:
-            channel: Their topic, of a type in `KINDS`.
-            numbers: Gives the numbers of each at the first of some paths. (k, count)
-            texts: Dotted path → strings, the same in each.
-            places: Number among all messages, and time of recording [ns], of each. (k, 2)
+        `numbers` gives those of each at the first of some paths, `texts` the strings that
+        all have; `places` are number and time of recording [ns] of each. (k, 2)
         """
         kind = KINDS[channel.type]
         each = {signal: numbers(paths) for signal, paths in kind.signals.items()}

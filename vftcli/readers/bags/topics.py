@@ -60,13 +60,9 @@ def aligned(
 
 
 class Gathering:
-    """The signals of a recording as they are gathered, topic by topic.
+    """The signals of a recording at the leading topic's times, topic by topic.
 
-    Attributes:
-        lead: The topic with the joints' positions.
-        signals: Field of Recording → values at the leading topic's times. (T, k)
-        used: Topics beside the leading one that gave a signal.
-        remarks: What was chosen, and what looks suspicious.
+    `used` are topics beside the leading one that gave a signal.
     """
 
     def __init__(self, lead: Stream, request: ReadChoice, path: Path) -> None:
