@@ -80,7 +80,7 @@ ONE_TURN, TWO_TURNS = 2 * np.pi + 0.1, 13.0
 GAP_STEPS = 4.0  #: A step this many times the median is reported as a gap.
 
 
-@np.errstate(all="ignore")  # whatever a damaged file holds is judged, not computed with
+@np.errstate(all="ignore")  # a damaged file is judged, not computed with
 def cleaned(
     raw: RawLog,
     path: Path,
@@ -242,7 +242,7 @@ def _refuse_unknown_numbers(raw: RawLog, path: Path) -> None:
         row = number_of(raw, int(np.argmin(np.isfinite(raw.stamps))))
         raise LogError(f"{path}: the clock is not a number in sample {row}. Cut the row out.")
     for name, value in raw.signals.items():
-        # the largest tells whether all are finite; the slow look is only for the message
+        # the largest tells whether all are finite; the slow look is for the message
         if all(max(np.max(x), -np.min(x)) < ABSURD for x in pieces(value)):
             continue
         unknown = ~(np.abs(value) < ABSURD)

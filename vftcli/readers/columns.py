@@ -64,11 +64,11 @@ class Item(NamedTuple):
     #: What a value is multiplied with to be in SI units and in our sign.
     factor: float = 1.0
     unit: str | None = None  #: The unit as written, or None; of a wrench its frame.
-    #: Columns in a row that it covers, in a headerless table; 0 for all others.
+    #: Columns that it covers in a headerless table; 0 for all others.
     width: int = 1
-    #: The column names it means, in a headed table; None for those found without it.
+    #: The column names it means, None for those found without it.
     pattern: str | None = None
-    rate: float | None = None  #: Sampling rate of a table that has no clock. [Hz]
+    rate: float | None = None  #: Rate of a table without a clock. [Hz]
     cells: Cells = ()  #: One cell a joint, base to tip; one or two of the clock.
     remark: Remark | None = None  #: What is to be said of it, if anything is.
 
@@ -94,7 +94,7 @@ class ColumnSpec(NamedTuple):
 
     @property
     def width(self) -> int:
-        """Number of columns that a counting text describes, without ``_:*``."""
+        """Number of columns of a counting text, without ``_:*``."""
         return sum(item.width for item in self.items if item.rate is None)
 
 
@@ -199,8 +199,8 @@ JOINTS = range(3, 13)  #: Numbers of joints that a table may be of.
 STEPS = (1, 4, 16, 64)
 #: Share of a position's change that its own velocity may leave; another's leaves 1.
 OPEN = 0.35
-STILL = 0.02  #: Travel below which a joint need not show which velocity is its own. [rad]
-EVEN = 20.0  #: How much longer than the median a twentieth of a clock's steps are at most.
+STILL = 0.02  #: Travel below which a joint need not show its velocity. [rad]
+EVEN = 20.0  #: Most medians that all but a twentieth of a clock's steps take.
 #: Misfit of a current to a torque divided by its drive constant, friction left free: of a
 #: UR10e's target current .02 to .09, of its measured current .06 to .6.
 DRIVEN = 0.12

@@ -82,7 +82,7 @@ def opened(file: LogFile) -> Iterator[Any]:
 
 
 class Hdf5Table(ArrayTable):
-    """The datasets of numbers in an open HDF5 file or a group of it, as columns.
+    """The datasets of numbers in an open HDF5 file or a group, as columns.
 
     Images, texts, references, links to other files and what claims more than it stores
     are left out; nothing is read before it is asked for.
@@ -130,13 +130,13 @@ def table_of(path: Path, content: Hdf5, fewest_rows: int = 2) -> Hdf5Table:
         if own and len(shape) <= 2 and all(shape) and shape[0] >= fewest_rows:
             found[name] = item
 
-    content.visititems(look)  # follows no link to elsewhere, and comes to each once
+    content.visititems(look)  # comes to each once, and not elsewhere
     if not found:
         raise LogError(f"{path}: an HDF5 file without datasets of numbers, so no log.")
     return Hdf5Table(path, dict(sorted(found.items(), key=lambda item: natural(item[0]))))
 
 
-ALOHA_RATE = 50.0  #: ALOHA's recorder steps by DT = 0.02 s and stores no clock. [Hz]
+ALOHA_RATE = 50.0  #: ALOHA's recorder stores no clock. [Hz]
 ALOHA_WIDTH, ALOHA_ARM = 14, 7  #: Two arms of six joints, a gripper behind each.
 #: ALOHA's positions and efforts.
 ALOHA, DYNAMIXEL = "observations/qpos", "observations/effort"
@@ -198,7 +198,7 @@ def read_any(table: Hdf5Table, request: ReadChoice) -> RawLog:
                 f"{table.path}: has the layout of {project}, which has no torque. If you added "
                 "torques, name all: --columns t@20Hz,q=PATH/OF/POSITIONS,tau=PATH/OF/TORQUES."
             )
-    # The datasets of the one group that has positions by name, and those at the top.
+    # The datasets of the one group with positions, and those at the top.
     return from_table(table.within(level_of(table.path, names, "/"), top=True), request)
 
 
@@ -249,7 +249,7 @@ def recognises(file: LogFile, _: LogFormat) -> bool:
 def episodes(file: LogFile) -> Iterator[Episodes]:
     """The logs of an HDF5 file or of DROID's folder."""
     if file.is_folder:
-        # By the names of their folders, which is the order in which they are walked.
+        # By the names of their folders.
         paths = sorted(file.path.rglob(TRAJECTORY), key=lambda path: path.parent.parts)
         if not paths:
             raise LogError(f"{file.path}: no {TRAJECTORY} in it or below.")

@@ -43,7 +43,7 @@ def lines_of(content: memoryview) -> Iterator[tuple[int, bytes]]:
 
 
 def columns_of_lines(file: LogFile, lines: Iterable[tuple[int, bytes]]) -> tuple[Columns, Notes]:
-    """The numbers of objects, one a line; a last one that is cut is left out and said."""
+    """The numbers of objects, one a line; a cut last one is left out and said."""
     blocks: list[Columns] = []
     odd: list[int] = []  # numbers of lines without an object
     left = iter(lines)
@@ -124,7 +124,7 @@ BUILT_LIMIT = 1 << 20
 
 TOO_MUCH = "more numbers than a file of its size can hold"
 
-DEPTH = 32  #: Lists inside lists: a log has four, an array of states four or five.
+DEPTH = 32  #: Lists inside lists: a log has four or five.
 
 
 class Refused(pickle.UnpicklingError):
@@ -223,7 +223,7 @@ class ArrayUnpickler(pickle.Unpickler):
         return built
 
     def _array(self, stub: Stub) -> Built:
-        """An array, a view of the pickle's own bytes where it can be; a number; or bytes."""
+        """An array, a view of the pickle's bytes if possible; a number; or bytes."""
         shape: Data = ()
         order: Literal["C", "F"] = "C"
         if stub.name == "encode":  # how protocol 2 holds bytes
@@ -264,7 +264,7 @@ def load_arrays_only(file: LogFile) -> Data:
     remedy = "Pickles are opened only if they hold nothing but NumPy arrays; save with np.savez."
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # old opcodes' escapes: refused or read
+            warnings.simplefilter("ignore")  # old opcodes' escapes
             unpickler = ArrayUnpickler(content)
             log, size = unpickler.settled(unpickler.load())
             unpickler.claim(size)

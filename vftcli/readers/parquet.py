@@ -50,7 +50,7 @@ class ColumnarTable(Table):
 
     def __init__(self, file: LogFile) -> None:
         self.path: Path = file.path
-        self.rows: Indices | None = None  #: The rows that are decoded, all for None.
+        self.rows: Indices | None = None  #: Rows to decode, None for all.
         self._size = len(file.content)
         with guarded(self.path):
             schema, self._count = self._opened(file)
@@ -164,7 +164,7 @@ class ParquetTable(ColumnarTable):
 
     def _batches(self, columns: Places, rows: int) -> Iterator[Arrow]:
         names = [self.names[c] for c in columns]
-        for group in range(self.file.num_row_groups):  # together they would all lie in memory
+        for group in range(self.file.num_row_groups):  # one at a time in memory
             yield from self.file.iter_batches(rows, [group], names, use_threads=False)
 
 
@@ -191,7 +191,7 @@ class ArrowTable(ColumnarTable):
 
 
 def claims(content: Arrow) -> Iterator[tuple[int, int]]:
-    """Rows of each batch, and the bytes it says to unpack to; nothing is unpacked."""
+    """Rows of each batch, and the bytes that it says to unpack to."""
     import pyarrow as pa
 
     for message in pa.ipc.MessageReader.open_stream(content):

@@ -33,7 +33,7 @@ class RawLog:
         #: Field of Recording → (T, n), `wrench` → (T, 6), in SI units.
         "Mapping[str, Array]"
     )
-    wrench_frame: "WrenchFrame | None" = None  #: What the log states of its wrench.
+    wrench_frame: "WrenchFrame | None" = None  #: The log's own.
     joint_names: tuple[str, ...] = ()  #: The joints' names, base to tip, or empty.
     #: Name of the profile that the log itself settles, or None.
     robot_hint: str | None = None
@@ -41,7 +41,7 @@ class RawLog:
     degrees_possible: bool = False
     #: What the reader dropped, turned or derived, and what looks suspicious.
     remarks: "tuple[Remark, ...]" = ()
-    payload_mass: float | None = None  #: Mass that the controller counts with. [kg]
+    payload_mass: float | None = None  #: The controller's. [kg]
     #: Its centre of mass in flange axes. (3,) [m]
     payload_com: tuple[float, ...] | None = None
     #: Which of several recordings, as "episode 3"; "" for the only one.
@@ -162,7 +162,7 @@ class ReadChoice(Choice):
         return recording if self.interval is None else recording.between(*self.interval)
 
     def wants(self, signal: str) -> bool:
-        """Whether a signal has to be read; the clock and the positions always are."""
+        """Whether a signal is to be read, as clock and positions always are."""
         return self.signals is None or signal in self.signals or signal in {"t", "q"}
 
 

@@ -41,14 +41,14 @@ class LogFormat(NamedTuple):
     folder: bool = False  #: Whether it is a folder.
     #: Whether it takes any table, and is asked only if no other format fits.
     general: bool = False
-    takes_columns: bool = True  #: Whether the columns may be described by ``--columns``.
+    takes_columns: bool = True  #: Whether ``--columns`` may describe it.
     #: Whether it reads ``--columns`` itself where its files are text.
     describes: bool = False
     episodes: bool = False  #: Whether a file may hold several recordings.
-    columns: str = ""  #: The columns that its program writes, in the grammar of ``--columns``.
+    columns: str = ""  #: Its program's columns, in the grammar of ``--columns``.
     #: Its last columns hold the payload's mass, then its centre.
     payload: str = ""
-    clock: str = ""  #: Which clock its stamps are from, in words; "" for the column's name.
+    clock: str = ""  #: Its clock in words, "" for the column's name.
     remedy: str = ""  #: What to do where clock or positions are missing.
 
     @property
@@ -169,7 +169,7 @@ def read_chosen(path: str | Path, choice: ReadChoice, label: str = "") -> Record
     reader = _reader(file, choice)
     if choice.episode is not None and not reader.episodes:
         raise LogError(f"{path}: one recording, without episodes; leave --episode out.")
-    with np.errstate(all="ignore"):  # what a damaged file holds is judged when it is cleaned
+    with np.errstate(all="ignore"):  # a damaged file is judged when it is cleaned
         raw = reader.read(file, choice)
         raw = replace(raw, remarks=(*file.remarks, *raw.remarks))
         raw = without_unknown_rows(raw) if choice.skips_unknown else raw

@@ -153,13 +153,13 @@ class JacobianLog(NamedTuple):
     path: Path
     sha256: str  #: Digest of its bytes.
     t: Array  #: Time since its first sample. (T,) [s]
-    tau_ext: Array  #: The vendor's estimate of the torque on the robot. (T, n) [N·m]
+    tau_ext: Array  #: The vendor's estimate, on the robot. (T, n) [N·m]
     jacobian: Array  #: Rows of velocity, then of angular velocity. (T, 6, n)
-    wrench: Array | None  #: What a sensor reads, in axes of its own, or None. (T, 6) [N, N·m]
+    wrench: Array | None  #: A sensor's, in its axes, or None. (T, 6) [N, N·m]
     remarks: Notes = ()  #: What reading dropped or turned.
 
 
-@np.errstate(all="ignore")  # whatever a damaged file holds is judged, not computed with
+@np.errstate(all="ignore")  # a damaged file is judged, not computed with
 def jacobian_log(path: Path, found: JacobianError, choice: ReadChoice, name: str) -> JacobianLog:
     """Read the log in which positions were looked for in vain."""
     table = found.table

@@ -37,7 +37,7 @@ Arrow = Any  #: An array, type or buffer of pyarrow, which has no stubs.
 class Table(ABC):
     """Columns of numbers that are loaded when they are asked for."""
 
-    path: Path | str  #: What messages call the table: the file, and in a bag the topic.
+    path: Path | str  #: Its name in messages: the file, in a bag the topic.
     names: Names  #: Column names, none for a headerless table.
     width: int  #: Number of columns.
     remarks: Notes = ()  #: What loading dropped or mended.
@@ -49,7 +49,7 @@ class Table(ABC):
 
     @abstractmethod
     def blocks(self, columns: Places, clock: int | None) -> Blocks:
-        """Columns as float64, some thousand rows at a time; a clock may stay integers."""
+        """Columns as float64, some thousand rows each; a clock may stay integers."""
 
     def load(self, columns: Places, clock: int | None = None) -> Block:
         """All rows of some columns."""
@@ -59,7 +59,7 @@ class Table(ABC):
         return {c: np.concatenate([first[c], *(block[c] for block in more)]) for c in columns}
 
 
-Picks = dict[str, Item]  #: Field of Recording → its cells; and what is beside the signals.
+Picks = dict[str, Item]  #: Field of Recording → its cells.
 #: The log's own stamps, as vftcli convert writes them. [ns]
 OWN_STAMPS = "t_src_ns"
 PAYLOAD = "payload"  #: Columns of which the last values are a mass and its centre.
@@ -146,12 +146,12 @@ def named_cells(table: Table, item: Item) -> Cells:
         if column in table.lists or not (match := template.fullmatch(name)):
             continue
         first = found.setdefault(int(match[1]), Cell(column))
-        # Old libfranka logs call commands as sent q_d and dq_d, as in the state before them.
+        # Old libfranka logs call commands q_d and dq_d, as in the state before.
         if first != Cell(column) and not item.signal.startswith("target"):
             raise SameNameError(table, name)
     if not found:
         raise NoColumnError(table, item.signal, pattern)
-    indices = range(min(found), min(found) + len(found))  # from 0 or from 1, but without holes
+    indices = range(min(found), min(found) + len(found))  # without holes
     if missing := [index for index in indices if index not in found]:
         raise LogError(
             f"{table.path}: {item.signal}={pattern} finds {len(found)} columns but none for "
@@ -230,7 +230,7 @@ HELD = 1 << 23
 
 
 class JoinedRows:
-    """The rows of a signal, part by part; beyond `HELD` bytes in a file if possible."""
+    """The rows of a signal, part by part; beyond `HELD` bytes in a file."""
 
     def __init__(self) -> None:
         self.count, self.shapes = 0, set[tuple[int, ...]]()
@@ -284,7 +284,7 @@ def numbers_of(values: Arrow) -> Column:
 
 
 def joined(parts: Iterable[Signals]) -> Signals:
-    """Signals joined of parts, each as one array; all parts have the same signals."""
+    """Signals joined of parts, each as one array."""
     found: dict[str, JoinedRows] = {}
     for part in parts:
         for name, rows in part.items():

@@ -89,7 +89,7 @@ def from_table(
 
 
 def _by_values(table: Table) -> tuple[Table, str]:
-    """A table without a header, loaded, and its columns by value, with a remark."""
+    """A table without a header, loaded, and its columns by value."""
     if table.width == 1:
         raise LogError(
             f"{table.path}: a single column of numbers: one signal in a file of its own. Join the "
@@ -168,7 +168,7 @@ def force_frame(names: Sequence[str], stamps: Array) -> WrenchFrame:
 
 
 def recognises(file: LogFile, layout: LogFormat) -> bool:
-    """Whether a text is of a format: printed JointState, table with header or not."""
+    """Whether a text is of a format: a printed JointState, a table."""
     if not file.lines:
         return False
     if layout.name == "ros2-echo":
@@ -238,7 +238,7 @@ def _numbers(loaded: Block, cell: Cell) -> Column:
 def _stamps(
     table: Table, clock: Item | None, loaded: Block, rows: int, clock_name: str
 ) -> tuple[Column, float, str]:
-    """The stamps of the rows (T,), the length of their tick and which clock they are."""
+    """The rows' stamps (T,), their tick's length and which clock it is."""
     if clock is None:
         raise LogError(
             f"{table.path}: no clock. Name its column (--columns t=…) or the rate (t@125Hz)."

@@ -49,7 +49,7 @@ VECTORS = ("force.x", "force.y", "force.z", "torque.x", "torque.y", "torque.z")
 
 
 def parts_at(paths: Sequence[str], there: Container[str]) -> list[str]:
-    """The first path that exists, or a wrench's six numbers below it; or none."""
+    """The first path there, or a wrench's six numbers below it; or none."""
     each = ([p] if p in there else [f"{p}.{part}" for part in VECTORS] for p in paths)
     return next((names for names in each if all(name in there for name in names)), [])
 
@@ -169,7 +169,7 @@ def types_of(definition: str, name: str, *, idl: bool) -> Types:
 
 
 def element_of(described: Any) -> tuple[str, int | None]:  # noqa: ANN401 - nested tuples of rosbags
-    """A field's type or its elements', and count: None for one, −1 for any number."""
+    """A field's type or its elements', and count: None for one, −1 for any."""
     node, inner = described
     if node == 1:  # a primitive with a bound
         return str(inner[0]), None
@@ -203,7 +203,7 @@ def type_store() -> Any:  # noqa: ANN401 - rosbags makes its types as it goes
 
 
 def types_for(channel: Channel) -> Types:
-    """All types that a channel's messages are made of: the container's own first."""
+    """All types of a channel's messages, the container's own first."""
     known: Types = dict(type_store().fielddefs)
     if channel.definition:
         known |= types_of(channel.definition, long_name(channel.type), idl=channel.idl)
@@ -220,7 +220,7 @@ def types_for(channel: Channel) -> Types:
 
 
 def _paths_by_name(text: str) -> dict[str, Names]:
-    """Name → paths, of words as "q=position|q": a path for each release's name."""
+    """Name → paths, of words as "q=position|q", one a release."""
     words = (word.split("=") for word in text.split())
     return {name: tuple(paths.split("|")) for name, paths in words}
 
@@ -271,7 +271,7 @@ KINDS = {
 LAYOUTS = 512
 
 
-TIMES = ("receive", "header", "robot")  #: What a stream has beside its signals.
+TIMES = ("receive", "header", "robot")  #: Beside its signals.
 
 
 class Stream:
@@ -289,7 +289,7 @@ class Stream:
 
     @cached_property
     def columns(self) -> Columns:
-        """Times and signals of all messages, of one width, in order of recording."""
+        """Times and signals of all messages, in order of recording."""
         count = self.series["place"].count
         found = {
             name: rows.whole()
@@ -340,7 +340,7 @@ Numbers = Callable[[Sequence[str]], Array]
 
 
 class Decoder:
-    """Turns batches into streams, keeping only the numbers a Recording can hold."""
+    """Turns batches into streams of the numbers a Recording can hold."""
 
     def __init__(self, budget: ReadBudget) -> None:
         self.budget = budget
@@ -351,7 +351,7 @@ class Decoder:
         self.others: dict[str, str] = {}
 
     def take(self, batch: Batch, places: Integers) -> None:
-        """Decode messages with these places (k, 2); note topics without a decoder."""
+        """Decode messages at their places (k, 2); note other topics."""
         channel = batch.channel
         if channel.type not in KINDS or channel.encoding not in {"ros1", "cdr"}:
             self.others[channel.topic] = channel.type or channel.encoding

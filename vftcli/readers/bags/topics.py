@@ -174,7 +174,7 @@ class Gathering:
         if (times is lead.receive) != (own is stream.receive):
             times, own = lead.receive, stream.receive
         if signal != "wrench":
-            # Another topic may hold further joints, or the same in another order.
+            # Another topic may hold other joints, or another order.
             if stream.names and lead.names and values.shape[1] == len(stream.names):
                 values = values[:, [stream.names.index(name) for name in lead.names]]
             if values.shape[1] != lead.width:
@@ -196,7 +196,7 @@ class Gathering:
         return True
 
     def report_left_out(self, streams: Sequence[Stream], unread: dict[str, str]) -> None:
-        """Remark which messages and topics were left out, those with forces first."""
+        """Remark messages and topics that were left out, forces first."""
         lead, topic = self.lead, self.lead.topic
         rest = (s for s in streams if s is not lead and s.channel == lead.channel)
         for stream in (s for s in rest if s.names == lead.names):
@@ -215,7 +215,7 @@ FIELDS = {"position": "q", "velocity": "dq", "effort": "effort"}
 
 
 def same_arm(stream: Stream, lead: Stream) -> bool:
-    """Whether a stream is about the leading topic's joints, or names no joints."""
+    """Whether a stream is of the leading topic's joints, or names none."""
     if "q" not in stream.signals and "effort" not in stream.signals:
         return False
     if not stream.names or not lead.names:
