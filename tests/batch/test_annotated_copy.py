@@ -12,9 +12,8 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from vftcli.batch import WorkersChoice, annotated_copy
-from vftcli.batch.annotated_copy import annotate, gathered, joint_names
-from vftcli.batch.annotation import ForceChoice
+from vftcli.batch import WorkersChoice, annotation
+from vftcli.batch.annotation import ForceChoice, annotate, gathered, joint_names
 from vftcli.batch.cluster import Outcome
 from vftcli.observers import ObserverChoice
 from vftcli.readers.reader import ReadChoice
@@ -144,7 +143,7 @@ def test_the_bytes_are_those_of_two_workers(tmp_path: Path) -> None:
 
 def test_a_run_goes_on_where_it_was_cut_off(tmp_path: Path, monkeypatch) -> None:
     done: list[int] = []
-    analysed, write = annotated_copy.estimate_episodes, annotated_copy.write_file
+    analysed, write = annotation.estimate_episodes, annotation.write_file
 
     def counted(choice: Any, task: Any) -> Any:
         if not task.rows.is_file():
@@ -154,14 +153,14 @@ def test_a_run_goes_on_where_it_was_cut_off(tmp_path: Path, monkeypatch) -> None
     def cut(*_: Any) -> Any:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(annotated_copy, "estimate_episodes", counted)
-    monkeypatch.setattr(annotated_copy, "write_file", cut)
+    monkeypatch.setattr(annotation, "estimate_episodes", counted)
+    monkeypatch.setattr(annotation, "write_file", cut)
     copy = tmp_path / "copy"
     with pytest.raises(KeyboardInterrupt):
         made(FIXTURE, copy)
     assert not copy.exists()
     assert copy.with_name(f"{copy.name}.partial").is_dir()
-    monkeypatch.setattr(annotated_copy, "write_file", write)
+    monkeypatch.setattr(annotation, "write_file", write)
     made(FIXTURE, copy)
     assert done == [0, 1, 2]
     assert [path.name for path in tmp_path.iterdir()] == ["copy"]

@@ -45,8 +45,7 @@ def annotate_dataset(
 
     Example: vftcli annotate fixtures/panda_episodes -o forces
     """
-    from vftcli.batch.annotated_copy import annotate
-    from vftcli.batch.annotation import USUAL, ForceChoice
+    from vftcli.batch.annotation import USUAL, ForceChoice, annotate
     from vftcli.outputs.run_record import to_json
 
     added = [name.strip() for word in add or () for name in word.split(",")]

@@ -6,7 +6,7 @@ import h5py
 import numpy as np
 import pytest
 
-from vftcli.batch.annotated_copy import open_dataset
+from vftcli.batch.annotation import open_dataset
 from vftcli.batch.datasets import ForceColumn
 from vftcli.batch.datasets.hdf5 import Hdf5Dataset, files_below
 from vftcli.signals.errors import LogError

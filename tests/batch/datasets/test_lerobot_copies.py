@@ -9,7 +9,7 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-from vftcli.batch.annotated_copy import open_dataset
+from vftcli.batch.annotation import open_dataset
 from vftcli.batch.datasets import ForceColumn
 from vftcli.batch.datasets.lerobot import LeRobotDataset, statistics_of, with_features
 from vftcli.signals.errors import LogError
