@@ -33,24 +33,24 @@ if TYPE_CHECKING:
 
 @record
 class Analysis(Shown):
-    """One log, one robot, its observers' estimates, and their errors."""
+    """One log, one robot, the estimates, and their errors."""
 
-    #: The log with its robot as used (payload, friction), and its known free motion.
+    #: The log with its robot as used, and its free motion.
     motion: "FreeMotion"
     observers: tuple[Observer, ...]  #: The observers that ran.
     estimates: tuple[ExternalTorque, ...]  #: Their estimates, in the same order.
-    #: Meaning of each observer's parameters at this log's sample time, by name.
+    #: Meaning of each observer's parameters for this log, by name.
     tunings: Mapping[str, Tuning]
     #: Corrections of the estimates by the complete log, or None.
     refinement: "Refinement | None" = None
     #: The wrenches and their limits, or None if none was asked for.
     virtual_sensor: "SensorReading | None" = None
     reference: ExternalTorque | None = None  #: The torque to compare with, or None.
-    #: The tidy error table (`vftcli.evaluation.SCHEMA`), or None without a reference.
+    #: The errors (`vftcli.evaluation.SCHEMA`), or None.
     errors: "pl.DataFrame | None" = None
     #: The contacts, or None if not asked or not known.
     contacts: "ContactList | None" = None
-    #: A printed table beside these errors, or None if none was asked for.
+    #: A printed table beside these errors, or None.
     published: "Comparison | None" = None
     #: Findings on the log, then on its free runs.
     examinations: "tuple[Examination, ...]" = ()
@@ -88,7 +88,7 @@ class Analysis(Shown):
 
     @property
     def wrench(self) -> "Wrench | None":
-        """The wrench of the first observer with one: `best` if contacts are listed."""
+        """The first observer's wrench: `best` if contacts are listed."""
         return next(iter(self.wrenches), None)
 
     @cached_property
@@ -155,13 +155,13 @@ class Analysis(Shown):
         return run if found is None else found.baselines.of(name).of(run)
 
     def spare(self) -> None:
-        """Free the terms of a long log; they are made again on request."""
+        """Free the terms of a long log, which are made again."""
         self.motion.log.spare("terms")
         if self.refinement is not None:
             self.refinement.baselines.best.spare()
 
     def free_log(self, name: str | None = None) -> "FreeLog":
-        """The log with its free motion, as an observer has it, or the model."""
+        """The log with its free motion, as an observer has it."""
         from vftcli.free_motion.free_motion import without_load
         from vftcli.wrench.sensing import FreeLog, as_modelled
 

@@ -45,7 +45,7 @@ OpenedLogs = Sequence[Opened]  #: Several such logs.
 def errors_of(
     analyses: Sequence[Analysis], others: "Sequence[pl.DataFrame]" = ()
 ) -> "pl.DataFrame":
-    """The errors of several logs and of others in one table, pooled rows last."""
+    """The errors of several logs and of others, pooled rows last."""
     import polars as pl
 
     from vftcli.evaluation.errors import PoolMember, evaluate_pooled
@@ -114,7 +114,7 @@ def identified(
     task: Task,
     tell: Callable[[Recording], None] | None = None,
 ) -> "Identification":
-    """The robot from logs, tried on those to `check`; free motion has no load."""
+    """The robot from logs, tried on those to `check`."""
     from vftcli.identification.fitting import identify
 
     examiner, library = choice.examiner, choice.library
@@ -182,12 +182,7 @@ def replayed(
 ) -> "Replayed":
     """A log's force, a scenario in the loop, or a release through every controller.
 
-    Args:
-        log: The log or scenario, None for a release.
-        asked: The controllers, whether unstable ones run too, and the log's options.
-        choice_of: The choice by those options.
-        release: Where a release begins, as ``x=0.3``.
-        seed: Seed of a scenario.
+    A release has no log and begins as ``x=0.3``; the seed is a scenario's.
     """
     from vftcli.admittance.closed_loop import Replayed
     from vftcli.admittance.replay import release_deviation, replay, replay_release
@@ -241,7 +236,7 @@ def replayed(
 def force_of(
     log: Run, choice: AnalysisChoice, source: str | None, stored: str | None
 ) -> "DrivingForce":
-    """The force of a replay: the log's own, a file's, an estimate's or a new one."""
+    """The force of a replay: the log's, a file's, stored or new."""
     from vftcli.admittance import replay
 
     assert choice.wrench is not None, "`replayed` asks for one"
@@ -262,7 +257,7 @@ def force_of(
 def looped(
     name: str, seed: int | None, choice: AnalysisChoice, control: ControlChoice, *, anyway: bool
 ) -> "Replayed":
-    """A scenario with a controller in the loop, its force through all controllers."""
+    """A scenario in the loop, its force through all controllers."""
     from vftcli.admittance.closed_loop import UNLOADED, Replayed, loop_of
     from vftcli.admittance.replay import replay
 

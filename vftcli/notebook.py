@@ -78,7 +78,7 @@ OF_REPORT = (*OF_ESTIMATE, AlsoWrench, ReferenceChoice)
 def choice_for(
     asked: Asked, logs: Iterable[Opened], observers: ObserverChoice | None = None
 ) -> AnalysisChoice:
-    """The choice for some logs, with other observers than it names if given."""
+    """The choice for some logs, with other observers if given."""
     library = Library(log for log in logs if not isinstance(log, Recording))
     return choice_of(asked, library, Examiner(anyway=asked.anyway), observers)
 

@@ -1,7 +1,4 @@
-"""From a log to its numbers, in the order of the data; long logs in blocks.
-
-In blocks memory does not grow with the log.
-"""
+"""From a log to its numbers, in the order of the data; long logs in blocks."""
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field, replace
@@ -46,7 +43,7 @@ WRITING = 0.7  # share of a log's work before its files are written
 
 @dataclass(frozen=True, kw_only=True)
 class AnalysisChoice:
-    """Choices on one log that estimate, compare and report share, one a room."""
+    """Choices that estimate, compare and report share, one a room."""
 
     #: Reading of the log, and its part.
     read: ReadChoice = field(default_factory=ReadChoice)
@@ -102,12 +99,9 @@ class AnalysisChoice:
 
 
 def choice_of(
-    asked: Asked,
-    library: Library,
-    examiner: Examiner,
-    observers: ObserverChoice | None = None,
+    asked: Asked, library: Library, examiner: Examiner, observers: ObserverChoice | None = None
 ) -> AnalysisChoice:
-    """The choice of a command or a call, with `observers` instead if given."""
+    """The choice of a command or a call, with `observers` if given."""
     from vftcli.evaluation import ReferenceChoice
     from vftcli.wrench import WrenchChoice
 
@@ -130,7 +124,7 @@ def choice_of(
 
 
 def for_estimates(choice: AnalysisChoice) -> AnalysisChoice:
-    """A choice for writing estimates: contacts are listed if `best` runs."""
+    """A choice for estimates: contacts are listed if `best` runs."""
     return replace(choice, contacts=choice.contacts and BEST in choice.observers.names)
 
 
@@ -141,7 +135,7 @@ def for_comparison(choice: AnalysisChoice) -> AnalysisChoice:
 
 
 def list_touches(log: Run, choice: AnalysisChoice) -> Analysis:
-    """The contacts along a log, without any observer's estimate."""
+    """The contacts along a log, without any observer."""
     from vftcli.contacts.listing import list_contacts
 
     motion = read(log, choice)
@@ -183,7 +177,7 @@ def run_of(recording: Recording, robot: Robot, choice: AnalysisChoice) -> Run:
 
 
 def check_logged(recording: Recording, why: str) -> None:
-    """Raise if a signal was derived from the complete log, with the reason."""
+    """Raise if a signal was derived from the complete log."""
     if recording.source.derived:
         raise MissingSignalError(
             f"{recording.name}: joint velocities (dq) that are derived from positions need the "
@@ -263,7 +257,7 @@ def read(log: Run, choice: AnalysisChoice) -> FreeMotion:
 
 
 def examine(motion: FreeMotion, choice: AnalysisChoice) -> tuple["Examination", ...]:
-    """Examinations of the log, then of its free runs; meaningless ones raise."""
+    """Examinations of the log, then of its free runs."""
     runs = [motion.log, *(free.run for free in motion.runs)]
     found = [choice.examiner.examine(run.recording, run.robot) for run in runs]
     motion.log.recording.release()  # much of it is only examined
@@ -286,7 +280,7 @@ def observe(
     *,
     running: bool = True,
 ) -> Analysis:
-    """Run the observers along the log; if not `running`, only build them for it."""
+    """Run the observers along the log, or only build them for it."""
     log, run, step = motion.log, choice.observers.run, motion.log.recording.median_step
     own = choice.observers.gains_of_log
     shown = LogSpectra() if baselines is None else baselines.spectra(gains=own)
@@ -307,7 +301,7 @@ def observe(
 
 
 def refine(analysis: Analysis, baselines: "Baselines | None", choice: AnalysisChoice) -> Analysis:
-    """The estimates with the bands that the complete log allows."""
+    """The estimates with the complete log's bands."""
     if baselines is None:
         return analysis
     from vftcli.bias import refine as room
@@ -343,12 +337,12 @@ def find_contacts(
 
 
 def unloaded_motion(motion: FreeMotion, choice: AnalysisChoice) -> FreeMotion:
-    """The log with its free motion; if none is given, its unloaded spans."""
+    """The log with its free motion, or its unloaded spans."""
     return motion if choice.wrench is None else motion.unloaded(choice.wrench.zero.spans)
 
 
 def sense(analysis: Analysis, choice: AnalysisChoice, *, unasked: bool = True) -> Analysis:
-    """The analysis with wrenches: as asked, or `unasked` of `best` with contacts."""
+    """The analysis with wrenches: as asked, or `unasked` of `best`."""
     if analysis.virtual_sensor is not None or (choice.wrench is None and not unasked):
         return analysis
     asked, names = choice.wrench, tuple(o.name for o in analysis.observers)
@@ -425,7 +419,7 @@ WHOLE_ROWS = 100_000
 
 
 def comes_in_blocks(recording: Recording, choice: AnalysisChoice) -> bool:
-    """Whether a log is long and nothing asked needs all of it at once."""
+    """Whether a log is long and nothing needs all of it at once."""
     if recording.samples <= WHOLE_ROWS or recording.dq is None or recording.source.derived:
         return False
     if choice.looks_back or choice.lists_contacts or choice.reference is not None:

@@ -134,7 +134,7 @@ def effort_of(recording: Recording, robot: Robot, choice: AnalysisChoice) -> Pro
 
 
 def free_log(log: Path, choice: AnalysisChoice) -> ProposedOption:
-    """A further log as free motion, if nothing touches the arm; else a remark."""
+    """A further log as free motion, if untouched; else a remark."""
     label = choice.library.label(log)
     try:
         run = prepared(choice.library.open(log, choice.read.whole), choice)
@@ -158,7 +158,7 @@ ONE_CYCLE = (
 
 
 def references(run: Run, choice: AnalysisChoice) -> Iterator[ProposedOption]:
-    """References for estimates, each tried; the first that works holds."""
+    """References, each tried; the first that works holds."""
     plain = replace(choice, observers=ObserverChoice(names=("gmo",)), contacts=False)
     found = False
     for name, why in reasons(run.recording).items():

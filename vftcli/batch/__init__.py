@@ -1,7 +1,4 @@
-"""Many logs: one work on each, in this process, on its cores, or on a cluster.
-
-Here is the user's choice of where.
-"""
+"""Many logs: one work on each, in this process, on its cores, or on a cluster."""
 
 import re
 from importlib.util import find_spec
@@ -24,11 +21,7 @@ class WorkersChoice(Choice):
     jobs: Annotated[
         int | None,
         Option(
-            "--jobs",
-            "N",
-            "Use N processes; default: one a core, at most 8.",
-            least=0,
-            most=4096,
+            "--jobs", "N", "Use N processes; default: one a core, at most 8.", least=0, most=4096
         ),
     ] = None
     #: Address of a running Dask scheduler, or None.
@@ -47,8 +40,7 @@ class WorkersChoice(Choice):
         ),
     ] = None
     ca: Annotated[
-        Path | None,
-        Option("cluster.ca", "FILE", "Certificate of the cluster's authority.", Path),
+        Path | None, Option("cluster.ca", "FILE", "Certificate of the cluster's authority.", Path)
     ] = None
     cert: Annotated[Path | None, Option("cluster.cert", "FILE", "Own certificate.", Path)] = None
     key: Annotated[Path | None, Option("cluster.key", "FILE", "Its key.", Path)] = None
@@ -82,7 +74,7 @@ class WorkersChoice(Choice):
         return tuple(path for path in (self.ca, self.cert, self.key) if path is not None)
 
     def check_closed(self, *, anyway: bool) -> None:
-        """Refuse a cluster open to anyone, unless the user accepts that."""
+        """Refuse a cluster open to anyone, unless `anyway`."""
         if self.address is not None and self.address.startswith("tcp") and not anyway:
             raise ParameterError(
                 f"cluster.address={self.address}: anyone who reaches a tcp:// cluster can run code "

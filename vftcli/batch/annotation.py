@@ -53,7 +53,7 @@ from vftcli.wrench.solvers import FRAMES
 USUAL = "kfo-zoh"  #: The observer if none is named: it needs no later sample.
 SIGN = "what the environment exerts ON the robot"  #: Sign of all that is added.
 TOGETHER = 16  #: Episodes of one task, and of one file of rows.
-#: Up to so many files are written without new processes, which take seconds to start.
+#: Most files that are written without new processes.
 FEW = 32
 HERE = WorkersChoice(jobs=0)  #: This process alone.
 Dataset = LeRobotDataset | Hdf5Dataset  #: A folder of episodes to copy.
@@ -64,8 +64,8 @@ class ForceChoice(AnalysisChoice):
     """Request for every episode, of one observer."""
 
     observers: ObserverChoice = field(default_factory=lambda: ObserverChoice(names=(USUAL,)))
-    contacts: bool = False  #: Whether it is wanted which frames lie in a contact of the list.
-    sd: bool = False  #: Whether the observer's own standard deviation is wanted.
+    contacts: bool = False  #: Whether frames in contact are wanted.
+    sd: bool = False  #: Whether the standard deviation is wanted.
     #: Whether to go on after a finding, and without results.
     anyway: bool = False
 
@@ -90,7 +90,7 @@ class ForceChoice(AnalysisChoice):
 
     @property
     def is_online(self) -> bool:
-        """Whether torques and wrench need no later samples, if dq is logged."""
+        """Whether nothing needs later samples, if dq is logged."""
         wrench = self.wrench
         back = wrench is not None and (
             wrench.smooths(self.observer) or bool(wrench.zero.spans) or wrench.zero.start
@@ -173,7 +173,7 @@ def check_signals(recording: Recording, *, anyway: bool) -> None:
 
 
 def columns_of(analysis: Analysis, choice: ForceChoice) -> dict[str, Single]:
-    """An episode's columns by name, a row a frame, NaN without an estimate."""
+    """An episode's columns by name, a row a frame, else NaN."""
     estimate, t = analysis.estimates[0], analysis.t
     found: dict[str, Array] = {"external_torque": estimate.tau}
     if choice.sd:
@@ -412,7 +412,7 @@ def refuse_missing(record: Record) -> None:
 
 
 def joint_names(made: Record) -> list[str]:
-    """Joint names, of the first episode with any; all need as many joints."""
+    """Joint names, of the first episode with any."""
     episodes = made["episodes"]
     known = [one for one in episodes if one["status"] != "missing"]
     if not episodes:
@@ -430,7 +430,7 @@ def joint_names(made: Record) -> list[str]:
 def write_file(
     dataset: Dataset, columns: list[ForceColumn], suffix: str, task: FileTask
 ) -> Record:
-    """Write a data file with its columns; its place and its episodes' statistics."""
+    """Write a data file with its columns; its place and statistics."""
     begin("writing")
     rows: dict[str, Any] = {}
     for path in filter(Path.is_file, task.rows):

@@ -30,7 +30,7 @@ from vftcli.signals.progress import heard_by, nobody
 if TYPE_CHECKING:
     from distributed import Client, Future
 
-LITTLE = 20.0  #: Work of this process before workers start, which takes seconds. [s]
+LITTLE = 20.0  #: Work of this process before workers start. [s]
 ANSWER = 10.0  #: Time for a scheduler to answer and to have a worker. [s]
 SETTLED = 0.5  #: Time from a worker's first task until its nanny knows of it. [s]
 LOOK = 5.0  #: Time between counts of the workers while nothing ends. [s]
@@ -60,7 +60,7 @@ HEAD = 4096  #: First bytes of a file that are compared. [B]
 
 Task = TypeVar("Task")
 
-#: Function of one task; it returns something small that can be pickled.
+#: Function of one task; its result is small and can be pickled.
 Work = Callable[[Task], Any]
 Tell = Callable[[str], None]  #: Receives a sentence on each step.
 KILLED = "KilledWorker"  #: Error type of a task if its worker died each time.
@@ -237,7 +237,7 @@ def standing(choice: WorkersChoice, tell: Tell) -> Iterator["Client"]:
 
 
 def check_workers(client: "Client", seen: Sequence[str]) -> None:
-    """Check that every worker has this process's code and sees its files."""
+    """Check that every worker has this code and sees its files."""
     here = surroundings(seen)
     for address, there in client.run(surroundings, seen, on_error="return").items():
         if not isinstance(there, dict):
@@ -332,7 +332,7 @@ def settle() -> None:
 
 
 class Workers:
-    """Count of a cluster's workers; on this machine kept at the initial one."""
+    """Count of a cluster's workers, on this machine kept."""
 
     def __init__(self, client: "Client") -> None:
         self._client, self._wanted = client, len(client.nthreads())
@@ -340,7 +340,7 @@ class Workers:
         self._looked = self._enough = self._some = time.monotonic()
 
     def look(self) -> None:
-        """Count them, at most once every `LOOK` seconds, and start missing ones."""
+        """Count them, once every `LOOK` seconds, and start missing ones."""
         now = time.monotonic()
         if now - self._looked < LOOK:
             return
@@ -379,7 +379,7 @@ def first_done(futures: "list[Future[Any]]", workers: Workers) -> "list[Future[A
 
 
 def result_of(future: "Future[Any]") -> "list[Any] | Failure | None":
-    """Results of a group's tasks, their failures, or None if unknown yet."""
+    """Results of a group, its failure, or None if unknown yet."""
     from distributed.scheduler import KilledWorker
 
     if future.status not in {"finished", "error"}:

@@ -54,13 +54,13 @@ def content_digest(files: Iterable[Path]) -> str:
 
 
 def options_digest(options: Any) -> str:  # noqa: ANN401 - choices of every room
-    """The sha256 of options, of the files they name, and of the program's version."""
+    """The sha256 of options, their files, and the program's version."""
     named = with_files(options, lambda path: Path(digest_of(path)))
     return sha256(json.dumps([VERSION, named], sort_keys=True, default=plain))
 
 
 def key_of(content: str, options: str, part: object = None) -> str:
-    """The key of a log's result: of content, options, part of the file."""
+    """The key of a log's result, by content, options, part."""
     return sha256("\n".join((content, options, "" if part is None else str(part))))
 
 
@@ -70,7 +70,7 @@ def sha256(text: str) -> str:
 
 
 def with_files(value: Any, change: Callable[[Path], Path]) -> Any:  # noqa: ANN401
-    """Options with every file name changed: paths, ``file:PATH``, robot files."""
+    """Options with every file name changed, in ``file:PATH`` too."""
     match value:
         case Path():
             return change(value)
@@ -93,7 +93,7 @@ def with_files(value: Any, change: Callable[[Path], Path]) -> Any:  # noqa: ANN4
 
 
 def plain(value: Any) -> Any:  # noqa: ANN401
-    """A form for JSON, equal in every process: sets in order, classes by name."""
+    """A form for JSON, equal in every process: sets in order."""
     match value:
         case frozenset() | set():
             return sorted(map(str, value))
@@ -162,7 +162,7 @@ def work_on_log(task: LogTask) -> None:
 
 
 def write_result(folder: Path, analysis: Analysis, task: LogTask) -> None:
-    """Write the files of a command's result; `compare` has its rows alone."""
+    """Write a command's files; `compare` has its rows alone."""
     job = task.job
     if job.do == "estimate":
         from vftcli.outputs.estimates import write_estimate_folder
@@ -245,7 +245,7 @@ def rows_of(analysis: Analysis, key: str) -> pl.DataFrame:
 
 
 def estimate_sizes(analysis: Analysis) -> Iterator[dict[str, Any]]:
-    """Size of each estimate, a row per observer and joint, then per axis."""
+    """Size of each estimate by observer and joint, then by axis."""
     for estimate in analysis.estimates:
         for joint, column in enumerate(estimate.tau.T, start=1):
             rms, most = size_of(column)
@@ -260,7 +260,7 @@ def estimate_sizes(analysis: Analysis) -> Iterator[dict[str, Any]]:
 
 
 def size_of(values: Array) -> tuple[float | None, float | None]:
-    """Root mean square and 99 % quantile of known |values|, or None."""
+    """RMS and 99 % quantile of known |values|, or None."""
     known = np.abs(values[np.isfinite(values)])
     if not len(known):
         return None, None

@@ -35,10 +35,7 @@ def closed_cluster(workers: int, memory: int, security: Any, silence: int) -> An
     }
     return distributed.SpecCluster(
         workers=dict.fromkeys(range(workers), worker),
-        scheduler={
-            "cls": Scheduler,
-            "options": {**where, "port": 0, "dashboard": False},
-        },
+        scheduler={"cls": Scheduler, "options": {**where, "port": 0, "dashboard": False}},
         worker=worker,
         security=security,
         silence_logs=silence,

@@ -36,7 +36,7 @@ from vftcli.signals.errors import LogError, NoLogError, UnknownFormatError
 from vftcli.signals.progress import stage
 
 NUMBER = re.compile(rb"(?:^|[\s,;])[-+]?[0-9.]+(?:[eE][-+]?[0-9]+)?(?=$|[\s,;])")
-#: A file of JSON beside logs that is smaller is read to see whether it is one. [B]
+#: A smaller file of JSON is read to see whether it is a log. [B]
 DESCRIPTION = 1 << 20
 FEWEST = 3  #: Numbers in a row: time, a position, an effort.
 SMALL = 300_000  #: Logs of fewer bytes share a task. [B]
@@ -90,7 +90,7 @@ class BatchRun:
         self.done: set[str] = set()
 
     def groups(self) -> Iterator[list[LogTask]]:
-        """Groups of logs to do, those of equal bytes once, small ones together."""
+        """Groups of logs to do, equal bytes once, small ones together."""
         there, begun = self.folder.keys(), set[str]()
         workers = max(1, self.workers.jobs or 4)
         most = max(1, min(TOGETHER, len(self.logs) // (SHARES * workers)))
@@ -242,9 +242,6 @@ class LogCollection:
 
     A file is a log, whatever it holds. Of a folder what no reader knows is left out, and what
     our commands wrote. Each episode is a log.
-
-    Attributes:
-        passed: Files of folders that were left out.
     """
 
     def __init__(self, choice: ReadChoice, leave: Path | None = None) -> None:
@@ -252,7 +249,7 @@ class LogCollection:
         self._choice = replace(choice, episode=None) if choice.episode == ALL else choice
         self._leave = leave and absolute(leave)
         self._searched: set[Path] = set()
-        self.passed: list[Path] = []
+        self.passed: list[Path] = []  #: Files of folders that were left out.
 
     def find(self, places: Iterable[Path]) -> Iterator[LogEntry]:
         """The logs of files, folders and patterns, each once."""
@@ -275,7 +272,7 @@ class LogCollection:
             yield LogEntry(path, self._choice.episode, (path,))
 
     def _episodes(self, path: Path, reader: LogFormat) -> Iterator[LogEntry]:
-        """An entry an episode; one alone where there is one, or one is chosen."""
+        """An entry an episode; one where there is one, or one is chosen."""
         chosen, files = self._choice.episode, tuple(files_of(path))
         if reader.name == "lerobot":
             from vftcli.readers import lerobot
@@ -290,14 +287,14 @@ class LogCollection:
             yield LogEntry(path, number, files)
 
     def _inside(self, folder: Path) -> Iterator[LogEntry]:
-        """The folder if it is a log, else the logs in it and below, by name."""
+        """The folder if it is a log, else the logs below, by name."""
         place = folder.resolve()
         if folder == self._leave or place in self._searched or (folder / MARKER).is_file():
             return
         self._searched.add(place)
         try:
             reader = recognise(folder, self._choice)
-            # Without metadata.yaml a bag is a folder of several recordings, not pieces of one.
+            # Without metadata.yaml a bag is several recordings.
             several_bags = reader.name == "rosbag2" and not (folder / "metadata.yaml").is_file()
             if reader.name != "droid" and not several_bags:
                 yield from self._episodes(folder, reader)
@@ -343,7 +340,7 @@ class LogCollection:
 
 
 def files_written(folder: Path) -> set[str]:
-    """Names of the files that vftcli wrote into a folder, by its record."""
+    """Names of files that vftcli wrote into a folder."""
     try:
         record = json.loads((folder / SEAL).read_text("utf-8"))
         return {SEAL, *map(str, record["files"])} if "vftcli" in record["versions"] else set()

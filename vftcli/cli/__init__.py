@@ -69,7 +69,7 @@ def vftcli(
 
 
 def main() -> None:
-    """Run the app; an error that a user can mend is one line and exit code 1."""
+    """Run the app; a user's error is one line and exit code 1."""
     for library in ("OPENBLAS", "OMP", "MKL"):
         # Matrices are small: threads only wait, and change last digits.
         os.environ[f"{library}_NUM_THREADS"] = "1"
@@ -123,10 +123,7 @@ def launch() -> None:
 
 
 class NoPandas(MetaPathFinder):
-    """Finds no pandas, which pyarrow imports for .3 s wherever it is.
-
-    No table here is its.
-    """
+    """Finds no pandas, which pyarrow imports for .3 s wherever it is."""
 
     def find_spec(self, fullname: str, *_: object) -> None:
         """Raise for it, as if it were not installed."""
@@ -165,7 +162,7 @@ def stop(number: int, _frame: FrameType | None) -> None:
 
 
 class ClosedOutput(io.TextIOBase):
-    """Standard output that the caller closed: writing raises, as on a full disk."""
+    """Standard output that the caller closed: writing raises."""
 
     def write(self, _text: str) -> int:
         """Raise, whatever is written."""

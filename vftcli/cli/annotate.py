@@ -81,7 +81,7 @@ def copy_lines(record: Mapping[str, Any], observer: str) -> list[str]:
     kind = "causal" if record["causal"] else "NOT causal: it looks ahead, no policy can run on it"
     lines = [
         f"{counted(sum(done.values()), 'episode')} ({count}), {frames} frames, "
-        f"{record['robot']['name']}, {observer}, {kind}",
+        f"{record['robot']['name']}, {observer}, {kind}"
     ]
     for name, column in record["columns"].items():
         # Unit and axes of a force, else the meaning of 1 and 0.

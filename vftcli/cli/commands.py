@@ -20,7 +20,7 @@ class ListedCommand(NamedTuple):
 
     @property
     def summary(self) -> str:
-        """First line of the function's docstring, read from the file for speed."""
+        """First line of the docstring, read from the file for speed."""
         text = (Path(__file__).parent / f"{self.file}.py").read_text("utf-8")
         found = re.search(rf'(?sm)^def {self.function}\(.*?"""(.*?)\n', text)
         return found[1] if found else ""
@@ -81,7 +81,7 @@ def with_command(words: list[str]) -> list[str]:
 
 
 def renewed(words: list[str], options: Container[str]) -> tuple[list[str], list[str]]:
-    """The words with today's options; notes on former ones. Gone ones raise."""
+    """The words with today's options; notes on former ones."""
     found, notes, arguments, rest = list[str](), list[str](), list[str](), iter(words)
     for word in rest:
         name, equals, value = word.partition("=")

@@ -39,7 +39,7 @@ def figure_folder(figures: str | None, output: Path | None, force: bool) -> "Out
 
 
 def terminal_text(rows: "pl.DataFrame", analyses: "Sequence[Analysis]", *, details: bool) -> str:
-    """The errors for the terminal; with details the pairs of observers below."""
+    """The errors for the terminal; with details pairs of observers."""
     import polars as pl
 
     from vftcli.evaluation.errors import POOLED
@@ -117,7 +117,7 @@ def compare(
     left_out, analyses, judged = LeftOut(library, logs), [], []
 
     def leave_out(log: Path, error: VftError) -> None:
-        """Judge a vendor's torques by their Jacobian; leave any other log out."""
+        """Judge a vendor's torques by their Jacobian, else leave the log out."""
         try:
             if not isinstance(error, JacobianError):
                 raise error

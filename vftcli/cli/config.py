@@ -1,7 +1,6 @@
 """Options in a TOML file: ``--config FILE``, or `vftcli.toml` in this folder.
 
-Its values become words behind the typed ones, and are checked like these. `run.json` has
-them in its command line.
+Its values become words behind the typed ones, and are checked like these.
 """
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
@@ -190,7 +189,7 @@ def options_of(command: Click) -> dict[str, Any]:
 
 
 def value_of(ctx: Click, option: Click, key: str, value: object, path: Path) -> Any:  # noqa: ANN401
-    """A value for typer's option: words, True, or None of a flag that is off."""
+    """A value for typer's option: words, True, or None of a flag."""
     if option.is_flag:
         if not isinstance(value, bool):
             raise ParameterError(f"{path}: {key} = {shown(value)} is neither true nor false")

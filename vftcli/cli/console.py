@@ -36,7 +36,7 @@ _level: ContextVar[int] = ContextVar("level", default=USUAL)
 
 @contextmanager
 def speaking(*, details: bool, quiet: bool) -> Iterator[None]:
-    """Set how much is printed for a block, and its progress on a terminal."""
+    """Set how much a block prints, and its progress on a terminal."""
     if details and quiet:
         raise typer.BadParameter("choose one of --details, --quiet")
     token = _level.set(DETAILS if details else QUIET if quiet else USUAL)
@@ -101,7 +101,7 @@ def say_written(
 
 
 def open_made(path: Path) -> None:
-    """Open a page, a folder's page or its recording in its viewer, and say so."""
+    """Open a page, a folder's page or its recording, and say so."""
     page, recording = path, path / "recording.rrd"
     if path.is_dir():
         page = path / "index.html"
@@ -149,15 +149,11 @@ def say_json(
 
 
 class LeftOut:
-    """The logs that a command cannot analyse, one line each; the others go on.
-
-    Attributes:
-        reasons: Label of every such log → why it is left out.
-    """
+    """The logs that a command cannot analyse, one line each; the others go on."""
 
     def __init__(self, library: "Library", logs: Sequence[Path]) -> None:
         self._library, self._several = library, len(logs) > 1
-        self.reasons: dict[str, str] = {}
+        self.reasons: dict[str, str] = {}  #: Label of such a log → why.
 
     def add(self, log: Path, error: VftError) -> None:
         """Say that a log is left out, and why; raise it for the only one."""
@@ -192,7 +188,7 @@ def say_recording(recording: "Recording") -> None:
 def health_of(
     library: "Library", *, anyway: bool, fitting: bool = True, on_screen: bool = False
 ) -> "Examiner":
-    """The examiner of a command's logs: it prints one line on each."""
+    """The examiner of a command's logs, printing a line on each."""
     from vftcli.doctor.examination import Examiner, doubt
     from vftcli.outputs.examination import health_line
 

@@ -57,8 +57,7 @@ def file_for(robot: str) -> Path:
 def identify_robot(
     logs: opt.Logs,
     output: Annotated[
-        Path | None,
-        opt.OUT._replace(help="Write here; default: my_ROBOT.toml in this folder."),
+        Path | None, opt.OUT._replace(help="Write here; default: my_ROBOT.toml in this folder.")
     ],
     asked: Asked,
     check: opt.Check,

@@ -26,8 +26,7 @@ def inspect_log(
     logs: opt.Logs,
     asked: Asked,
     output: Annotated[
-        Path | None,
-        opt.OUT._replace(help="Write here; the options that this log needs."),
+        Path | None, opt.OUT._replace(help="Write here; the options that this log needs.")
     ],
     strict: Annotated[
         bool, Option("--strict", "", "Exit with 1 if anything looks wrong, for CI.")

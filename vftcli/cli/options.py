@@ -94,7 +94,7 @@ ENDING = re.compile(r"(?<=.)(\.[A-Za-z]\w*)?(\.(gz|zst|zstd|bz2|xz))?$")
 
 
 def folder_of(output: Path | None, logs: Sequence[Path], asked: Asked) -> Path:
-    """Output folder of a command: as typed, else here, named after the log."""
+    """Output folder: as typed, else here, named after the log."""
     if output is not None:
         return output
     if len(logs) > 1:
@@ -200,7 +200,7 @@ EMPTY = inspect.Parameter.empty
 
 
 def parameter(name: str, what: Any, option: Option, default: object = EMPTY) -> inspect.Parameter:  # noqa: ANN401
-    """An option or argument for typer; one that may be missing has a default."""
+    """An option or argument for typer, with a default if it may be missing."""
     if default is EMPTY and (not option.metavar or NoneType in get_args(what)):
         default = None if option.metavar else False
     how: dict[str, Any] = {"help": option.help, "min": option.least, "max": option.most}
@@ -213,7 +213,7 @@ def parameter(name: str, what: Any, option: Option, default: object = EMPTY) -> 
 
 
 def typed_as(what: Any, option: Option) -> Any:  # noqa: ANN401 - annotations
-    """Typer's type of a field's typed text; the room replaces a missing one."""
+    """Typer's type of a field's typed text."""
     if not option.metavar:
         return bool
     among = (what, *get_args(what))

@@ -22,7 +22,7 @@ ENOUGH = 0.02
 
 
 class Stages:
-    """One line on stderr after `QUICK`: share of the work, stage, time left."""
+    """One line on stderr after `QUICK`: share, stage, time left."""
 
     def __init__(self) -> None:
         self._begun: float | None = None
@@ -36,7 +36,7 @@ class Stages:
         self._lock = threading.RLock()  # printing and the line take turns
 
     def hear(self, stage: str, share: float) -> None:
-        """Note the present stage, "" if unchanged, and the share that is done."""
+        """Note the stage, "" if unchanged, and the share that is done."""
         if self.stopped is not None:
             raise self.stopped
         if not stage or self.silent:

@@ -157,7 +157,7 @@ def estimate(
         refuse_estimates(log)
     OutputFolder(output, force, names).check()
     choice = opt.choice_for(asked, library)
-    # Of a large log only the needed columns are read; outputs show all.
+    # Of a large log only needed columns are read; outputs show all.
     few = not (choice.lists_contacts or choice.wrench or written.extras)
     choice = pipeline.for_estimates(choice)
     recording = library.open(log, replace(choice.read, signals=EXAMINED if few else None))

@@ -19,8 +19,7 @@ def reproduce(
     output: Annotated[Path | None, opt.OUT._replace(help="Write here; default: huang2025.vft.")],
     figures: opt.Figures,
     only: Annotated[
-        str | None,
-        Option("--only", "NAME,...", "Run only these: table1...table4, fig1...fig13."),
+        str | None, Option("--only", "NAME,...", "Run only these: table1...table4, fig1...fig13.")
     ],
     fast: Annotated[bool, Option("--fast", "", "Use one seed a scenario instead of five.")],
     force: opt.Force,

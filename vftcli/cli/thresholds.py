@@ -19,8 +19,7 @@ def contact_thresholds(
     check: opt.Check,
     json: opt.Json,
     rate: Annotated[
-        float,
-        Option("--rate", "PER_HOUR", "Allow this many false alarms an hour; default 1."),
+        float, Option("--rate", "PER_HOUR", "Allow this many false alarms an hour; default 1.")
     ] = 1.0,
 ) -> None:
     """Find contact thresholds from contact-free logs.

@@ -65,7 +65,7 @@ COLUMNS = {
     "idle_s": Column("idle", "s", ".3f", seldom=True),
     "work_J": Column("work", "J", ".3f", seldom=True),
 }
-#: Key of a latency → its column; behind the name of its field is the unit.
+#: Key of a latency → its column; it ends in the unit.
 LATENCIES = {
     "force_s": Column("force", "s", ".3f"),
     "detection_s": Column("detected", "s", ".3f"),
@@ -96,7 +96,7 @@ def comparison_grid(rows: Sequence[Record], title: str = "") -> Grid:
 
 
 def latency_rows(run: ClosedLoop) -> list[Record]:
-    """The latencies of a closed loop as rows, None for what did not happen."""
+    """A closed loop's latencies as rows, None for what did not happen."""
     return [
         {
             "axis": AXES[entry.axis],
@@ -136,7 +136,7 @@ def parameter_grid(replay: Replay) -> Grid:
 
 
 def stability_grid(replay: Replay) -> Grid:
-    """Stability numbers before any motion: the worst axis of each kind."""
+    """Stability numbers of the worst axis of each kind."""
     rows: Rows = []
     kinds = (("position", slice(0, 3), "m"), ("rotation", slice(3, 6), "rad"))
     for controller, (axes, part, unit) in product(replay.controllers, kinds):
@@ -180,11 +180,7 @@ def files_of_replay(form: str | None) -> list[str]:
 
 
 def write_admittance(
-    path: Path,
-    found: Replayed,
-    command: str = "",
-    force: bool = False,
-    form: str | None = None,
+    path: Path, found: Replayed, command: str = "", force: bool = False, form: str | None = None
 ) -> None:
     """Write the folder of a replay, all or nothing."""
     replay, run, record = found.replay, found.run, admittance_record(found, command)

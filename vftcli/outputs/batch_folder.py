@@ -26,7 +26,7 @@ from vftcli.outputs.files import (
 from vftcli.outputs.run_record import to_json
 from vftcli.signals.errors import OutputError
 
-#: Command and options of a folder's rows; the first file of a batch.
+#: Command and options of the rows; the first file of a batch.
 MARKER = "batch.json"
 
 TABLE, FAILURES, PAGE = "batch.parquet", "failures.parquet", "index.html"
@@ -36,7 +36,7 @@ PIECE = 500  #: Logs with rows in memory at a time.
 
 
 class BatchFolder:
-    """The folder of a batch; `table` is the name of its gathered table."""
+    """The folder of a batch; `table` names its gathered table."""
 
     def __init__(self, path: Path, table: str = TABLE) -> None:
         self.path, self.table = Path(path), table
@@ -59,7 +59,7 @@ class BatchFolder:
 
     @contextmanager
     def opened(self, options: str, record: Record, *, force: bool) -> Iterator[None]:
-        """Make or resume the batch folder for a block, held against other runs."""
+        """Make or resume the folder for a block, held against other runs."""
         with writing(self.path):
             check_letters(self.path)
             self._check(options, force=force)
@@ -127,7 +127,7 @@ class BatchFolder:
         page: Callable[[], str],
         record: Record,
     ) -> None:
-        """Write the tables, a row group a piece, then the page, then their seal."""
+        """Write tables, a row group a piece, then page, then seal."""
         from pyarrow.parquet import ParquetWriter
 
         (self.path / SEAL).unlink(missing_ok=True)

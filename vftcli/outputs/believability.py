@@ -1,8 +1,6 @@
 """Grounds to believe an answer or not, each with its remedy.
 
-They come from the analysis: examinations, contact list, friction, clock, joints at rest,
-and an independent measurement of the force. Terminal, page and ``run.json`` show the
-same items.
+Terminal and page show the same.
 """
 
 from collections.abc import Iterator, Sequence
@@ -67,10 +65,10 @@ LIST_SUBJECTS = {
     "free-part-misses-joints": "not moved",
     "no-wrench-of-few-joints": "wrench",
 }
-#: Above this unexplained share of torques the arm, a sign or the effort is wrong.
+#: Above this unexplained share arm, sign or effort is wrong.
 MOST_UNEXPLAINED = 0.5
 MOST_OFF = 4  #: Most rows named that miss their sensor reading.
-FULL_OF_REST = 0.5  #: A joint rests if it does so in more than this share of the log.
+FULL_OF_REST = 0.5  #: A joint rests if it does so in more than this share.
 
 #: An item's effect on trust in the answer.
 Standing = Literal["good", "caution", "bad", "unknown"]
@@ -87,12 +85,12 @@ class Ground(NamedTuple):
     subject: str  #: Its subject, in one to three words.
     sentence: str
     remedy: str | None = None  #: A command that mends it, or None.
-    #: Whether it was found in this log, and is not true of every log like it.
+    #: Whether it is of this log, not of every log like it.
     of_log: bool = True
 
 
 class LogSummary(NamedTuple):
-    """One log among several; fields up to `detectable_N` are columns of a batch's table."""
+    """One log among several; up to `detectable_N` a batch's columns."""
 
     log: str  #: Its label.
     robot: str
@@ -104,7 +102,7 @@ class LogSummary(NamedTuple):
     hardest_N: float | None = None
     hardest_band_N: float | None = None  #: Half width of its 95 % band.
     hardest_s: float | None = None  #: Time of its peak.
-    #: Its smallest and largest size where that depends on an unknown place.
+    #: Its smallest and largest size, by an unknown place.
     hardest_anywhere_N: tuple[float, float] | None = None
     detectable_N: float | None = None  #: Least visible force, None if unknown.
     error: str = DASH  #: The least mean RMSE and its observer. [N·m]
@@ -113,7 +111,7 @@ class LogSummary(NamedTuple):
 
     @property
     def rank(self) -> tuple[int, float]:
-        """Sort key: the worst health first, then the hardest contact."""
+        """Sort key: worst health first, then hardest contact."""
         return SEVERITY.index(self.health), -(self.hardest_N or 0.0)
 
     @property
@@ -138,7 +136,7 @@ class LogSummary(NamedTuple):
         return self._asdict() | {"contacts": count, "hardest": self.hardest} | entries
 
 
-#: Field of a log's summary → its column in the table of several logs.
+#: Field of a log's summary → its column.
 LOG_COLUMNS = {
     "log": "log",
     "robot": "robot",
@@ -204,7 +202,7 @@ def least_error(errors: "pl.DataFrame | None") -> str:
 
 
 def grounds(analysis: Analysis) -> tuple[Ground, ...]:
-    """All grounds to believe an analysis or not, the bad ones first."""
+    """All grounds to believe an analysis or not, bad ones first."""
     found = [
         robot_ground(analysis),
         *finding_grounds(analysis),
@@ -223,7 +221,7 @@ def grounds(analysis: Analysis) -> tuple[Ground, ...]:
 
 
 def health(found: Sequence[Ground]) -> Ground:
-    """The worst ground found in a log itself, the first of equals."""
+    """The worst ground of a log itself, the first of equals."""
     return min((g for g in found if g.of_log), key=lambda ground: SEVERITY.index(ground.standing))
 
 
@@ -323,7 +321,7 @@ def list_grounds(analysis: Analysis) -> Iterator[Ground]:
 
 
 def friction_grounds(analysis: Analysis) -> Iterator[Ground]:
-    """Joints at rest, the friction model's source and its temperature."""
+    """Joints at rest, the friction model, its temperature."""
     robot, rests = analysis.robot, resting(analysis.recording)
     if rests.any():
         dry, joints = dry_friction(robot.friction, robot.joints), np.flatnonzero(rests).tolist()
@@ -358,7 +356,7 @@ def resting(recording: Recording) -> Mask:
 
 
 def reference_ground(analysis: Analysis) -> Ground:
-    """Whether anything measures the force independently of the observers."""
+    """Whether anything else measures the force."""
     if analysis.reference is not None:
         known = ""
         if analysis.errors is not None:
@@ -397,7 +395,7 @@ def reference_ground(analysis: Analysis) -> Ground:
 
 
 def missed_words(contacts: Sequence[Contact]) -> str:
-    """Rows that miss the sensor by more than their band; "" for none."""
+    """Rows off the sensor by more than their band; "" for none."""
     off = []
     for row in contacts:
         force, band, read = row.peak_force, row.peak_band, row.sensor_force
@@ -416,7 +414,7 @@ def subject_of(code: str) -> str:
 
 
 def remedy_of(finding: Remark, log: Recording, analysis: Analysis) -> str:
-    """The command that mends a finding, else one that says more about it."""
+    """The command that mends a finding, or says more."""
     robot = robot_option(analysis)
     if finding.code in LOADS:
         return payload_command(analysis)
@@ -440,6 +438,6 @@ def payload_command(analysis: Analysis) -> str:
 
 
 def robot_option(analysis: Analysis) -> str:
-    """Value of ``--robot`` for an analysis' arm: profile name, or file."""
+    """Value of ``--robot`` for an analysis: profile, or file."""
     robot = analysis.robot
     return robot.name if robot.path in {None, *PROFILES.values()} else str(robot.path)

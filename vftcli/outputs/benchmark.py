@@ -40,7 +40,7 @@ FACTS = (
     pl.col("observer_us", "command_us").mean(),
     pl.col("truth_error_Nm").max(),
 )
-#: Key of a row → its column, for every table of rows below the headline.
+#: Key of a row → its column, in the tables below the headline.
 ARM_COLUMNS = {
     "method": "method",
     "rmse": Column("RMSE", "N·m"),
@@ -92,14 +92,14 @@ NEAR = "~: nearer to the least RMSE than the truth's own error"
 
 
 class Results:
-    """All results of a benchmark, pooled by arm and never across arms."""
+    """All results of a benchmark, pooled by arm."""
 
     def __init__(self, table: pl.DataFrame) -> None:
         self.table = table
         self.methods, self.protocols = seen(table, "method"), seen(table, "protocol")
         #: Name → colour of every method but zero, which is grey.
         self.colours = colours_of_names([name for name in self.methods if name != "zero"])
-        #: One row an arm, protocol, method and part, for machines and tables.
+        #: One row an arm, protocol, method and part.
         self.rows = [*self.torques()]
         # The columns of the headline are there without a row, too.
         floats = (pl.col("l1_Nm").alias(x) for x in ("l1_Nm", "skill", "missing", "seconds"))
@@ -112,7 +112,7 @@ class Results:
         )
 
     def pooled(self, key: str) -> Iterator[tuple[Record, Score]]:
-        """Place and score of logs together, of torques by "joint", of wrenches by "axis"."""
+        """Place and score of pooled logs: torques by "joint", wrenches by "axis"."""
         for _, own in self.table.drop_nulls(key).group_by(*PLACE, maintain_order=True):
             sums = own.group_by(key, maintain_order=True).agg(pl.col(*Score._fields).explode())
             yield own.select(*FACTS).row(0, named=True), Score.pooled(sums.to_dicts())
@@ -172,7 +172,7 @@ class Results:
                 )
 
     def lines(self) -> Iterator[str]:
-        """Lines below the headline: lists, arms, methods that use the future."""
+        """Lines below the headline."""
         yield from self.list_lines()
         shown = {row[0] for row in self.headline().rows}
         if rest := [method for method in self.methods if shown and method not in shown]:
@@ -226,7 +226,7 @@ def seen(rows: pl.DataFrame, key: str) -> list[str]:
 
 
 def arm_texts(rows: Sequence[Record]) -> list[Record]:
-    """A table's rows as texts, marked if the truth's error hides a difference."""
+    """A table's rows as texts, marked where the truth's error is larger."""
     least = min((row["rmse_Nm"] for row in rows if row["method"] != "zero"), default=0.0)
     error = max(row["truth_error_Nm"] for row in rows)
     found = []
@@ -250,7 +250,7 @@ def between(low: float, high: float, form: str = ".3g", to: str = "–") -> str:
 
 
 def list_texts(row: Record) -> Record:
-    """Counts of one arm's lists with texts, with their intervals."""
+    """Counts of one arm's lists as texts, with intervals."""
     found, true, false, hours = (row[k] for k in COUNTS)
     texts = dict.fromkeys(("share", "rate", "onset", "peaks"), DASH)
     if true:
@@ -269,7 +269,7 @@ def list_texts(row: Record) -> Record:
 
 
 def dots(rows: pl.DataFrame, methods: Sequence[str]) -> tuple[Scales, list[str], list[Record]]:
-    """Skill in contact of methods by arm: scales, arms from above, rows."""
+    """Skill in contact by arm: scales, arms from above, rows."""
     arms, own = seen(rows, "arm"), rows.filter(pl.col("method").is_in(methods)).to_dicts()
     low = max(min([0.0, *(row["skill"] for row in own)]), -1.0) - 0.05
     box = Box(height=46.0 * len(arms) + 26.0, width=400.0, left=8.0)
@@ -277,7 +277,7 @@ def dots(rows: pl.DataFrame, methods: Sequence[str]) -> tuple[Scales, list[str],
 
 
 def text_of(results: Results, form: str, *, every: bool) -> str:
-    """The results as text; on the terminal the headline, or `every` table."""
+    """The results as text; on the terminal the headline, or all."""
     headline, lines = results.headline(), tuple(results.lines())
     if form == "csv":
         return grid.csv_rows(results.rows, results.rows[0] if results.rows else ())
@@ -293,7 +293,7 @@ def render_benchmark(results: Results, title: str, record: Record) -> str:
     """The page of a benchmark."""
     keys = ("recording", "arm", "truth", "truth_error", "licence", "source")
     contact = results.numbers.filter(part="contact").partition_by("protocol", maintain_order=True)
-    # The worst 10 s of `best` in every log, by the log's first protocol.
+    # The worst 10 s of `best` in a log, by its first protocol.
     drawn = results.table.filter(part="worst").unique("log", keep="first", maintain_order=True)
     charts = list[Chart]()
     for row in drawn.to_dicts():

@@ -1,8 +1,7 @@
 """Charts of page, recording and paper figures, with colours and drawn samples.
 
 Every chart is an SVG (`page/shell.py`), one picture a joint or axis, for print and for
-readers without a script; the page's script replaces it. Of a long log the lowest and the
-highest sample of every stretch stay.
+readers without a script; the page's script replaces it.
 """
 
 from collections.abc import Iterable, Sequence
@@ -56,7 +55,7 @@ class ChartLine(NamedTuple):
     values: Array  #: One column a panel. (T, n)
     colour: str = INK  #: ``#rrggbb``, `INK` or `REFERENCE`.
     dash: str = ""  #: Dashes as in SVG; "" for a line without gaps.
-    #: Half the width of a ribbon about the line, NaN where it is not known. (T, n)
+    #: Half the width of a ribbon about it, NaN if unknown. (T, n)
     half: Array | None = None
     leads: bool = False  #: Whether it is drawn thicker.
     shown: bool = True  #: Whether it is drawn from the start.
@@ -89,7 +88,7 @@ class Chart(NamedTuple):
     spans: Sequence[tuple[float, float]] = ()  #: Stretches that are marked, as contacts. [s]
     unit: str = "s"  #: Unit of the horizontal axis.
     log: bool = False  #: Whether the horizontal axis is logarithmic.
-    #: Least lower end of the vertical axis, which then holds 0; None: by the lines.
+    #: Least lower end of the vertical axis, with 0; None: by lines.
     lowest: float | None = None
     highest: float | None = None  #: Upper end; None: by the lines.
 
@@ -101,7 +100,7 @@ class Chart(NamedTuple):
         return cls(key, title, (unit,), (title,), x, tuple(lines))
 
     def ends(self, panel: int) -> Span:
-        """Ends of the vertical axis of a panel's family, about ±1 without values."""
+        """Ends of a panel's vertical axis, about ±1 without values."""
         low, high, families = np.inf, -np.inf, self.families or self.units
         for j in (j for j, family in enumerate(families) if family == families[panel]):
             # Visible lines, one by one: all of a long log would fill the memory.
@@ -134,7 +133,7 @@ def lines_of_names(names: Sequence[str]) -> dict[str, LineStyle]:
 
 
 def paint(colour: str) -> str:
-    """A line's colour in the page, where only the force and `best` are blue."""
+    """A line's colour in the page: only force and `best` are blue."""
     own = {COLOURS["best"]: "var(--force)", INK: "var(--ink)", REFERENCE: "var(--reference)"}
     return {**own, COLOURS["fdo"]: OLIVE}.get(colour, colour)
 
@@ -205,7 +204,7 @@ def level_rows(
 
 
 def even_starts(samples: int, stretches: int) -> Index:
-    """First sample of so many stretches of equal length, rounded up. (stretches,)"""
+    """First samples of equal stretches, rounded up. (stretches,)"""
     return np.arange(0, samples, -(-samples // stretches))
 
 

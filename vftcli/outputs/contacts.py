@@ -133,7 +133,7 @@ def most_force(contact: Contact) -> str:
 
 
 def direction(force: Array) -> str:
-    """A force's direction in words: its main axes, the largest first."""
+    """A force's main axes in words, the largest first."""
     u = force / max(float(np.linalg.norm(force)), 1e-12)
     axes = [k for k in np.argsort(-np.abs(u), kind="stable").tolist() if abs(u[k]) > PART]
     return ", ".join(AXIS_WORDS[k][int(u[k] > 0)] for k in axes) or DASH
@@ -185,7 +185,7 @@ def contact_name(contact: Contact) -> str:
 
 
 def forces_along(contacts: Sequence[Contact], t: Array) -> tuple[Array, Array]:
-    """|F| of contacts along a log, and its 95 % band, else NaN. 2 × (T,) [N]"""
+    """|F| of contacts, and its 95 % band, else NaN. 2 × (T,) [N]"""
     force, half = np.full((2, len(t)), np.nan)
     for contact in contacts:
         if course := contact.course:
@@ -241,7 +241,7 @@ def contacts_csv(lists: Sequence[ContactList]) -> str:
 
 
 def hardest_rows(contacts: Sequence[Contact], most: int = MOST_ROWS) -> list[Contact]:
-    """At most `most` contacts, first those of known size by force, in time order."""
+    """So many contacts, the hardest of known size, in time order."""
     order = sorted(
         contacts,
         key=lambda c: (c.size_known, c.peak_force or 0.0, c.evidence or 0.0),
@@ -251,7 +251,7 @@ def hardest_rows(contacts: Sequence[Contact], most: int = MOST_ROWS) -> list[Con
 
 
 def contact_grid(contacts: Sequence[Contact]) -> Grid:
-    """The table of contacts; the joints' torques where no force is known."""
+    """The table of contacts; joint torques where no force is known."""
     known = any(contact.peak_force is not None for contact in contacts)
     size = (Column("|F|", "N", symbol="$|F|$"), Column("range", "N"), "direction")
     columns = (

@@ -1,8 +1,7 @@
 """Logs as files: flat tables or MCAP; simulated ones with their truth.
 
-An MCAP holds ROS 2 messages, for PlotJuggler and Foxglove; estimates become one too, with
-the topics in docs/outputs.md. All messages are CDR: JSON in a ros2 file stops rosbags'
-reader.
+An MCAP holds ROS 2 messages, with the topics in docs/outputs.md. All are CDR: JSON in a
+ros2 file stops rosbags' reader.
 """
 
 import json
@@ -69,7 +68,7 @@ def joint_topic(
     velocity: Array | None = None,
     effort: Array | None = None,
 ) -> OutputTopic:
-    """A topic of JointState messages, without signals that are None. (T, n)"""
+    """A topic of JointState messages of known signals. (T, n)"""
     signals = {"position": position, "velocity": velocity, "effort": effort}
     known = {key: values for key, values in signals.items() if values is not None}
     return OutputTopic(name, JOINT_STATE, {"name": list(joints), **known})
@@ -102,7 +101,7 @@ def wrench_topic(name: str, frame: str, values: Array) -> OutputTopic:
 
 
 def events(analysis: Analysis, start: int) -> list[Event]:
-    """Messages at begin and end of each contact; `start` is the log's stamp. [ns]"""
+    """Messages at begin and end of contacts in a log from `start`. [ns]"""
     made = list[Event]()
     for contact in analysis.listed:
         level = WARNING if contact.trust == "weak" else INFO
@@ -121,7 +120,7 @@ def ros_name(name: str) -> str:
 
 
 def source_stamps(recording: Recording) -> Nanoseconds:
-    """Time of every sample on the log's own clock. (T,) [ns]"""
+    """Time of every sample on its own clock. (T,) [ns]"""
     source = recording.source
     start = source.t0_ns if source.t0_ns is not None else round(source.t0 * 1e9)
     stamps: Nanoseconds = start + np.rint(recording.t * 1e9).astype(np.int64)
@@ -129,7 +128,7 @@ def source_stamps(recording: Recording) -> Nanoseconds:
 
 
 def stamps_of(recording: Recording) -> Nanoseconds:
-    """The log's own stamps, from 0 where ROS cannot count them. (T,) [ns]"""
+    """The log's stamps, from 0 if ROS cannot count them. (T,) [ns]"""
     stamps = source_stamps(recording)
     # A log may count from below zero; ROS cannot.
     countable = stamps[0] >= 0 and stamps[-1] // 10**9 <= LAST_STAMP
@@ -158,7 +157,7 @@ def write_topics(
                 stamp, values = waiting.popleft()
                 writer.add_message(log, stamp, serialised(LOG, values, 1).tobytes(), stamp)
 
-        # In blocks: all messages of an hour at 1 kHz would not fit in memory.
+        # In blocks: an hour's messages at 1 kHz do not fit in memory.
         for start in range(0, len(stamps), BLOCK):
             span = slice(start, start + BLOCK)
             bodies = [topic.messages(stamps, span) for topic in found]
@@ -193,7 +192,7 @@ def check_conversion(path: Path, force: bool) -> None:
 
 
 def flat_table(recording: Recording) -> "pl.DataFrame":
-    """A log as columns: t from 0, the source's own stamps, then the signals."""
+    """A log as columns: t from 0, own stamps, signals."""
     import polars as pl
 
     # Whole numbers: a float of today's date [s] is exact to 240 ns only.
@@ -202,7 +201,7 @@ def flat_table(recording: Recording) -> "pl.DataFrame":
 
 
 def write_parquet(recording: Recording, path: Path) -> None:
-    """Write flat columns, zstd; joint names, frame … in the metadata."""
+    """Write flat columns; joint names, frame … in the metadata."""
     frame = recording.wrench_frame
     metadata = {
         "format": recording.source.format,

@@ -36,7 +36,7 @@ from vftcli.wrench.solvers import LEAST_SIGMA
 if TYPE_CHECKING:
     from vftcli.analysis import Analysis
 
-#: An RMSE within this factor of the reference's floor may be the reference's own.
+#: An RMSE within this factor of the floor may be the reference's own.
 AT_FLOOR = 1.2
 
 DAGGER, LATEX_DAGGER = "†", r"$^\dagger$"
@@ -55,7 +55,7 @@ class Block(NamedTuple):
     floor: Array  #: The reference's own error, NaN if unknown. (joints,) [N·m]
     samples: tuple[int, int]  #: Fewest and most samples an entry is made of.
     means: JointMeans  #: Means over the joints.
-    #: Observer → largest share of a joint's samples without its answer, if any.
+    #: Observer → largest share of a joint's samples without answer.
     missing: dict[str, float]
     #: Joints at rest: do not trust their reference.
     untrusted: tuple[int, ...] = ()
@@ -233,7 +233,7 @@ def marks_in_words(found: Sequence[Block]) -> list[str]:
 
 
 def axis_grids(errors: pl.DataFrame, analyses: "Iterable[Analysis]" = ()) -> Iterator[Grid]:
-    """RMSE of the wrenches, a table a log; the paper's bounds below its arm."""
+    """RMSE of the wrenches, a table a log; the paper's bounds below."""
     published = {a.recording.name: a.robot.published for a in analyses}
     for group in logs_of(errors, "axis"):
         samples = compared_samples(group)

@@ -108,7 +108,9 @@ def write_groups(path: Path, groups: Iterable[Group], csv: Path | None = None) -
                     for wrench in analysis.wrenches
                     for kind in ("wrench", "wrench_sd", "wrench_masked")
                 }
-                schema = described_schema(table, frames, doubts_of(analysis))
+                doubts = overridden_lines(analysis.examinations)
+                about = {"vftcli": json.dumps({"overridden": doubts})} if doubts else {}
+                schema = described_schema(table, frames, about)
                 writer = ParquetWriter(file, schema, write_statistics=False, **how)
                 files.enter_context(writer)
                 if csv is not None:
@@ -119,12 +121,6 @@ def write_groups(path: Path, groups: Iterable[Group], csv: Path | None = None) -
             if csv is not None:
                 table.write_csv(text, include_header=False, float_precision=9)
     return analysis
-
-
-def doubts_of(analysis: Analysis) -> dict[str, str]:
-    """Doubts for the table's metadata."""
-    doubts = overridden_lines(analysis.examinations)
-    return {"vftcli": json.dumps({"overridden": doubts})} if doubts else {}
 
 
 #: Flag → name of its file.

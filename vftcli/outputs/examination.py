@@ -16,7 +16,7 @@ MOST_FITS = 3  #: Most profiles shown, the nearest, if they do not fit.
 
 
 def examination_record(examination: Examination) -> Record:
-    """All of the doctor's facts for machines, the reader's warnings too."""
+    """All of the doctor's facts for machines, and the reader's."""
     recording, source = examination.recording, examination.recording.source
     read = [remark for remark in source.remarks if remark.level == "warning"]
     return {
@@ -58,7 +58,7 @@ def rate_of(recording: Recording) -> float | None:
 
 
 def largest_step(recording: Recording) -> float | None:
-    """The longest time between two samples, or None for a single one. [s]"""
+    """The longest step, or None for a single sample. [s]"""
     return float(np.max(np.diff(recording.t))) if recording.samples > 1 else None
 
 
@@ -111,7 +111,7 @@ def warnings_of(examination: Examination) -> tuple[Remark, ...]:
 
 
 def examinations_text(examinations: Sequence[Examination], most: float) -> str:
-    """Texts of some logs; a line each where several have more lines than `most`."""
+    """Texts of some logs; a line each if they have more lines than `most`."""
     text = "\n\n".join(map(examination_text, examinations))
     if len(examinations) == 1 or text.count("\n") < most:
         return text
@@ -120,7 +120,7 @@ def examinations_text(examinations: Sequence[Examination], most: float) -> str:
 
 
 def health_line(examination: Examination, *, named: bool = False) -> str:
-    """Faults of a log on one line: number, the first, names of the others."""
+    """Faults of a log on one line: number, first, names of others."""
     recording, found = examination.recording, warnings_of(examination)
     head = f"{recording.name}: log health" if named else "log health"
     if not found:
@@ -133,7 +133,7 @@ def health_line(examination: Examination, *, named: bool = False) -> str:
 
 
 def command(name: str, log: Recording | None, *words: str) -> str:
-    """A command on a log as typed; None: a free log to be recorded."""
+    """A command on a log as typed; None: on a free log to record."""
     if log is None:
         return shlex.join(["vftcli", name, "free.csv", *words])
     columns = [f"--columns={log.source.columns}"] if log.source.columns else []
@@ -141,7 +141,7 @@ def command(name: str, log: Recording | None, *words: str) -> str:
 
 
 def path_of(log: Recording) -> str:
-    """A log's path as given, a stand-in for one made in memory."""
+    """A log's path as given, or a stand-in."""
     return str(log.source.path or "LOG")
 
 
@@ -164,7 +164,7 @@ def health_record(examinations: Iterable[Examination], *, fitting: bool = True) 
 
 
 def refused_codes(examinations: Iterable[Examination]) -> list[str]:
-    """Codes of findings that make results meaningless, each once."""
+    """Codes of refused findings, each once."""
     codes = (finding.code for one in examinations for finding in one.refusals())
     return list(dict.fromkeys(codes))
 

@@ -52,7 +52,7 @@ LOG_FIGURES = ("force", "torque", "errors", "wrench", "spectra", "tuning")
 TUNED_FIGURES = ("spectra", "tuning")  #: Those beside gains that were found.
 ERROR_FIGURES = ("errors",)  #: The figure of a table of errors.
 MOST = 8  #: Most logs in one figure of errors; more show only their summary.
-#: Gain drawn at -240 dB, so that its logarithm is finite; lowest gain shown. [–], [dB]
+#: Gain drawn for none, -240 dB; lowest gain shown. [–], [dB]
 QUIETEST, LOWEST = 1e-12, -80.0
 #: Colours of the two spectra.
 FREE, LOADED = "#3b7ea1", "#c2410c"
@@ -233,7 +233,7 @@ def spectra_drawing(spectra: Spectra, observers: Mapping[str, Observer]) -> Draw
 def tuning_drawing(
     curves: "Mapping[str, Curve]", chosen: "Mapping[str, tuple[Array, Array]]"
 ) -> Drawing:
-    """Expected error over frequency; chosen rates [rad/s] and errors [N·m]."""
+    """Expected error over frequency; chosen rates [rad/s], errors [N·m]."""
     styles = lines_of_names(list(curves))
     lines = [
         ChartLine(name, curve.rmse, *styles[name], x=curve.omega_n / (2.0 * np.pi))

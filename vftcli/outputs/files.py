@@ -106,7 +106,7 @@ def write_text(path: Path, text: str, force: bool = False) -> None:
 
 
 def put_text(path: Path, text: str) -> None:
-    """Write a text, equal bytes on every system, even with half a letter."""
+    """Write a text in equal bytes on every system."""
     # Digests are equal on every system. A file name may hold bytes that UTF-8 refuses.
     path.write_text(text, encoding="utf-8", errors="backslashreplace", newline="\n")
 
@@ -142,11 +142,11 @@ class OutputFolder:
         put_text(self / name, text)
 
     def digests(self, place: str = "") -> dict[str, str]:
-        """The sha256 of every file written below `place`, by its name there."""
+        """The sha256 of every file below `place`, by its name."""
         return digests(self.temporary / place)
 
     def check(self) -> None:
-        """Raise an OutputError before any work if a file must not be overwritten."""
+        """Raise an OutputError if a file must not be overwritten."""
         with writing(self.path):
             if self.path.exists() and not self.path.is_dir():
                 raise OutputError(f"{self.path} is a file; -o needs the name of a folder")
@@ -158,7 +158,7 @@ class OutputFolder:
             check_writable(next(p for p in (self.path, *self.path.parents) if p.exists()))
 
     def __enter__(self) -> Self:
-        """Check for files not to be overwritten, and make the temporary folder."""
+        """Check the files, and make the temporary folder."""
         self.check()
         try:
             # Outermost first, to be removed again if nothing comes of it.
@@ -257,7 +257,7 @@ def digest(path: Path) -> str:
 
 
 def digests(folder: Path) -> dict[str, str]:
-    """The sha256 of every file below a folder, by its name there, in order."""
+    """The sha256 of every file below a folder, by name, in order."""
     files = [path for path in sorted(folder.rglob("*")) if path.is_file()]
     return {path.relative_to(folder).as_posix(): digest(path) for path in files}
 
@@ -319,7 +319,7 @@ def check_letters(path: Path) -> None:
 
 
 def numbered(names: Iterable[str]) -> list[str]:
-    """Names that all differ: a repeated one gets the next number."""
+    """Names that all differ: a repeated one gets a number."""
     found: list[str] = []
     for name in names:
         free, number = name, 2
@@ -331,7 +331,7 @@ def numbered(names: Iterable[str]) -> list[str]:
 
 @contextmanager
 def writing(path: Path) -> Iterator[None]:
-    """Raise a block's errors of the system as one-line errors on `path`."""
+    """Raise a block's system errors as one-line errors on `path`."""
     try:
         yield
     except OSError as error:
@@ -350,7 +350,7 @@ if sys.platform != "win32":
 PARTIAL = ".vftcli-*.partial"  #: Every temporary folder's name, as a pattern of paths.
 #: Name of a temporary folder, with the number of its process.
 NAME = re.compile(r"\.vftcli-(\d+)-[0-9a-f]{8}\.partial")
-#: Age at which an unheld folder is cleared though its process number is in use again. [s]
+#: Age of an unheld folder that is cleared though its process number is in use. [s]
 UNSURE = 60.0
 
 
@@ -387,7 +387,7 @@ def partial_folder(parent: Path) -> Iterator[Path]:
 
 @contextmanager
 def held(folder: Path, *, wait: bool) -> Iterator[None]:
-    """Hold a folder for a block against others; a dead process holds nothing."""
+    """Hold a folder for a block; a dead process holds nothing."""
     if sys.platform == "win32":
         yield
         return
@@ -417,7 +417,7 @@ def to_disk(paths: Iterable[Path]) -> None:
 
 
 def check_writable(folder: Path) -> None:
-    """Raise the operating system's error if no file can be made in `folder`."""
+    """Raise the system's error if no file can be made in `folder`."""
     if not folder.is_dir():
         raise FileNotFoundError(2, "there is no such folder", str(folder))
     try:  # permissions do not tell on every file system

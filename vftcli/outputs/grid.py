@@ -24,7 +24,7 @@ DASH = "–"  #: Sign for an unknown number.
 
 
 def significant(value: float, digits: int = 3) -> str:
-    """A number with significant digits, an exponent only below 1e-4."""
+    """A number in significant digits, an exponent below 1e-4."""
     if not np.isfinite(value):
         return DASH
     if value == 0.0:
@@ -67,7 +67,7 @@ def vector(values: Iterable[float]) -> str:
 
 
 def percent(share: float) -> str:
-    """A share in per cent, with one decimal, or one significant digit."""
+    """A share in per cent: one decimal, or one significant digit."""
     value = 100.0 * share
     if 0.0 < value < 0.001:
         return "<0.001 %"
@@ -78,7 +78,7 @@ def percent(share: float) -> str:
 NUMBER = re.compile(r"(?:< )?[-−]?\d+(\.\d+)?")
 #: Unseen filler for missing decimals.
 DECIMALS = "." + 20 * "0"
-#: Width of a column of the IEEE, of a letter and of the gap between two columns. [in]
+#: Width of a column of the IEEE, a letter and a gap. [in]
 COLUMN_WIDTH, LETTER_WIDTH, COLUMN_GAP = 3.5, 0.058, 0.111
 
 
@@ -173,7 +173,7 @@ def keyed_grid(
 
 
 def joint_columns(joints: Sequence[int] | int, **shape: Any) -> tuple[Column, ...]:  # noqa: ANN401
-    """Columns J1, J2, …: joints by number from 1, or how many there are."""
+    """Columns J1, J2, …: of joints by number, or of so many."""
     numbers = range(1, joints + 1) if isinstance(joints, int) else joints
     return tuple(Column(f"J{j}", symbol=f"$J_{{{j}}}$", **shape) for j in numbers)
 
@@ -243,7 +243,7 @@ def table_lines(
 
 
 def markdown(grid: Grid) -> str:
-    """A table in GitHub's Markdown, its title above, the best bold."""
+    """A table in Markdown, its title above, the best bold."""
     heads = [escape_markdown(column.heading) for column in grid.columns]
     marks = ["---" if column.words else "---:" for column in grid.columns]
     texts = [[(escape_markdown(c.text), c.best) for c in row] for row in grid.cells]
@@ -305,7 +305,7 @@ def latex(*grids: Grid) -> str:
 
 
 def latex_cells(column: Sequence[GridCell]) -> list[str]:
-    """The entries of a column; numbers get room for missing decimals."""
+    """The entries of a column, numbers with room for decimals."""
     numbers = [NUMBER.fullmatch(cell.text) for cell in column]
     most = max((len(found[1] or "") for found in numbers if found), default=0)
     texts = []

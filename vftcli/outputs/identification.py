@@ -29,7 +29,6 @@ from vftcli.outputs.paper import (
 from vftcli.outputs.run_record import (
     CONVENTIONS,
     envelope,
-    file_sha256,
     input_record,
     log_entry,
     log_remarks,
@@ -67,7 +66,7 @@ DOTS = 600  #: Samples drawn in a residual-over-velocity plot.
 
 
 def files_beside(path: Path, form: str | None) -> list[str]:
-    """Names of a robot file, and of page, record and figures beside it."""
+    """Names of a robot file, page, record and figures."""
     if path.suffix.lower() != ".toml":
         raise OutputError(f"{path}: -o needs a name that ends in .toml, as my_robot.toml")
     drawn = figure_files(form, IDENTIFICATION_FIGURES, f"{path.stem}-")
@@ -102,13 +101,13 @@ def identification_record(
     found: Identification, logs: Sequence[Examination], command: str
 ) -> Record:
     """Everything `run.json` holds, and `--json` prints."""
-    recordings = [one.recording for one in logs]
+    recordings, profile = [one.recording for one in logs], robot_record(found.profile)
     about = {
         "examination": health_record(logs, fitting=False),
         "method": found.method,
         "inputs": [input_record(log) for log in recordings],
-        "profile": robot_record(found.profile),
-        "profile_sha256": file_sha256(found.profile.path),
+        "profile": profile,
+        "profile_sha256": profile["sha256"],
         "robot": found.robot.name,
         "processing": dict(found.processing),
         "residuals": found.residuals.to_dicts(),
@@ -159,7 +158,7 @@ def render_identification(
 def velocity_plot(
     coloured: Sequence[tuple[Trace, str]], j: int
 ) -> tuple[str, Scales, list[tuple[str, str]]]:
-    """A joint's residual over velocity: name, scales, dots of each log."""
+    """A joint's residual over velocity: name, scales, dots by log."""
     # One scale for all logs of a joint.
     speed = max(abs(t.motion.dq[:, j]).max() for t, _ in coloured) or 1.0
     sizes = np.concatenate([np.abs(t.residual[:, j]) for t, _ in coloured])
@@ -198,7 +197,7 @@ def torque_charts(found: Identification) -> tuple[Chart, ...]:
 
 
 def identification_figures(found: Identification) -> dict[str, Drawing]:
-    """Measured and predicted torque, and residuals, if there are logs."""
+    """Measured and predicted torque, and residuals, if any."""
     drawings = {}
     if found.traces:
         name = shown_trace(found).motion.recording.name
@@ -223,7 +222,7 @@ def tables_text(found: Identification) -> str:
 
 
 def residual_grid(found: Identification) -> Grid:
-    """RMS of measured less predicted torque by log, role and model. [N·m]"""
+    """RMS of residual torque by log, role and model. [N·m]"""
     # The place in the command distinguishes two logs of one label.
     keys = ("log_index", "log", "role", "model")
     rows: Rows = []

@@ -88,7 +88,7 @@ WHISKER_LOOK: Look = {"elinewidth": 0.6, "capsize": 1.4, "capthick": 0.6}
 CONTACT_LOOK: Look = {"facecolor": "0.9", "linewidth": 0.0, "zorder": 0.9}
 #: Colours of the page that follow its theme → theirs on white paper.
 PAINTS = {INK: "black", REFERENCE: "0.65"}
-#: Dashes of the page → those on paper, where they are too much like others.
+#: Dashes of the page → on paper, where they are like others.
 PAPER_DASHES = {"4 2": "9 3 2 3 2 3"}
 
 
@@ -125,7 +125,7 @@ def write_figures(
 
 @contextmanager
 def paper_style() -> Iterator[None]:
-    """Set matplotlib's style for a paper, in place of the user's settings."""
+    """Set matplotlib's style for a paper in a block."""
     from matplotlib import style
 
     with style.context(["default", STYLE]), warnings.catch_warnings():
@@ -235,7 +235,7 @@ def line_figure(
 
 
 def draw_plot(axes: "Axes", plot: Plot, *, ends_row: bool = True) -> None:
-    """One panel with its contacts, bands and lines, and the chart over it."""
+    """One panel with contacts, bands and lines, and the chart over it."""
     from matplotlib.ticker import MaxNLocator
 
     chart, j = plot.chart, plot.panel

@@ -113,7 +113,7 @@ def fill(
 def put_contacts(
     folder: OutputFolder, place: str, analyses: Sequence[Analysis], command: str
 ) -> None:
-    """Write the lists of contacts, if any, as `vftcli contacts` prints them."""
+    """Write the lists of contacts, if any, as JSON and CSV."""
     if lists := [each.contacts for each in analyses if each.contacts is not None]:
         folder.write(f"{place}contacts.json", to_json(contacts_envelope(analyses, command)))
         folder.write(f"{place}contacts.csv", contacts_csv(lists))
@@ -122,7 +122,7 @@ def put_contacts(
 def contacts_envelope(
     analyses: Sequence[Analysis], command: str, failed: Mapping[str, str] = {}
 ) -> Record:
-    """Contacts of logs, for machines, without those that `failed`."""
+    """Contacts of logs for machines, and those that `failed`."""
     logs = [log_entry(a.recording, contacts_record(a.contacts)) for a in analyses if a.contacts]
     return envelope(command, logs, found={"left_out": dict(failed)} if failed else {})
 
@@ -130,7 +130,7 @@ def contacts_envelope(
 def put_errors(
     folder: OutputFolder, place: str, analyses: Sequence[Analysis]
 ) -> pl.DataFrame | None:
-    """Write the error tables of all logs, if any; return their rows."""
+    """Write the error tables of all logs, if any; their rows."""
     found = [a.errors for a in analyses if a.errors is not None]
     if not found:
         return None

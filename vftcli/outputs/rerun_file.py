@@ -1,10 +1,8 @@
 """A Rerun recording: plots, words and the arm in one file that opens arranged.
 
 Every plot is a chart of one panel and one entity, its key, with one scalar
-per line, on the timeline `t` in seconds from the log's first sample. Words
-are Markdown documents. The arm is drawn with the meshes of its description,
-else with capsules from the chain. A contact's arrow is at its place while
-it lasts, below `/contacts`; the touched links have its colour.
+per line, on the timeline `t` in seconds from the log's first sample. A contact's
+arrow is at its place while it lasts; the touched links have its colour.
 """
 
 import hashlib
@@ -33,7 +31,7 @@ from vftcli.signals.pose import matrix_quaternion, rotation_onto
 
 Stream = rr.RecordingStream  #: A recording in the making.
 Packed = NDArray[np.uint32]  #: Colours in Rerun's form.
-#: When a link's colour changes [s] → that colour ``#rrggbb``, "" for its own.
+#: When a link's colour changes [s] → ``#rrggbb``, "" for its own.
 Changes = Mapping[float, str]
 
 ROBOT, CONTACTS = "/robot", "/contacts"  #: Roots of the arm and of the contacts, by number.
@@ -58,7 +56,7 @@ class ArmPoses(NamedTuple):
 
 
 def rgba(*colours: str) -> Packed:
-    """Colours ``#rrggbb`` as 0xRRGGBBAA: [r, g, b] is three colours to Rerun 0.30."""
+    """Colours as 0xRRGGBBAA: [r, g, b] is three colours to Rerun."""
     return np.array([int(f"{colour[1:]}ff", 16) for colour in colours], dtype=np.uint32)
 
 
@@ -77,7 +75,7 @@ def xyzw(rotation: Array) -> Array:
 
 
 def arrow_scale(found: ContactList | None) -> float:
-    """Newtons of 1 m of arrow, for a visible hardest force. [N/m]"""
+    """Newtons of 1 m of arrow, to see the hardest force. [N/m]"""
     if found is None or (hardest := found.hardest) is None:
         return NEWTON_PER_METRE
     force = hardest.peak_force or NEWTON_PER_METRE
@@ -341,7 +339,7 @@ def blueprint(
 
 def grid_of(tab: Tab) -> rrb.Grid | rrb.Vertical:
     """One tab, in two columns if it has many plots."""
-    # Plots of a family, else of a unit, share the ends of their vertical axes.
+    # Plots of a family, else of a unit, share their vertical ends.
     kinds, views = [plot.families or plot.units for plot in tab.plots], []
     ends: dict[tuple[object, ...], tuple[float, float]] = {}
     for kind, (low, high) in zip(kinds, (plot.ends(0) for plot in tab.plots), strict=True):

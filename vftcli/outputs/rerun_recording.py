@@ -52,7 +52,7 @@ from vftcli.wrench.solvers import ForceArrow
 
 #: Stretches of a long plot, lowest and highest sample each.
 STRETCHES = 5000
-#: Every sample stays so long before and after a contact's start. [s]
+#: Every sample stays so long about a contact's start. [s]
 AROUND = 1.0
 WHOLE_TIME = 20.0  #: Total time with every sample, over all contacts. [s]
 #: Meaning of a dagger in a plot's title.
@@ -91,7 +91,7 @@ def tabs_of(analysis: Analysis, detail: str) -> list[Tab]:
     strongest, tabs = hardest[: int(0.5 * WHOLE_TIME / AROUND)], []
     whole = [(c.start - AROUND, c.start + AROUND) for c in strongest]
     for name, group in steps(list(plot_groups(analysis).items())):
-        # One plot after the other: all of a long log would fill the memory.
+        # One after the other: all of a long log would fill the memory.
         shown = group if detail == FULL else (thinned(plot, STRETCHES, whole) for plot in group)
         if plots := list(shown):
             tabs.append(Tab(name, plots))
@@ -130,7 +130,7 @@ def plot_groups(analysis: Analysis) -> dict[str, Iterable[Chart]]:
 
 
 def plot_of(chart: Chart, j: int, key: str, minus: Array | float = 0.0) -> Chart:
-    """One panel less `minus`, with every line, a band as its two edges."""
+    """One panel less `minus`, a band as its two edges."""
     lines, edges = [], []
     for line in chart.series:
         values = line.values[:, j : j + 1] - minus
@@ -146,7 +146,7 @@ def plot_of(chart: Chart, j: int, key: str, minus: Array | float = 0.0) -> Chart
 
 
 def force_plot(analysis: Analysis, wrench: Wrench) -> Chart:
-    """|F| with its 95 % band, spans of the contacts below it, peaks as points."""
+    """|F| with its 95 % band, contacts' spans below, peaks as points."""
     found, sensed, t = analysis.contacts, analysis.virtual_sensor, analysis.t
     size, sd = wrench.size[:, None], wrench.size_sd
     lines = [ChartLine("|F|", size, COLOURS[BEST], leads=True)]
@@ -164,7 +164,7 @@ def force_plot(analysis: Analysis, wrench: Wrench) -> Chart:
                 ChartLine("smallest that is listed", np.full_like(size, least), SPARE[7])
             )
             title += f"; green: {at_least_shown(least)}, the smallest that is listed"
-        # The peak of every contact with a force; a load has a mean and no peak.
+        # Peaks of contacts with a force; a load has none.
         felt = [c for c in found.contacts if c.peak_force is not None and not c.is_load]
         force = np.array([c.peak_force for c in felt], dtype=float)
         level = -BELOW * np.nanmax(np.concatenate([size[:, 0], [1.0], force]))

@@ -6,7 +6,6 @@ import re
 import sys
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import fields, is_dataclass, replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -190,12 +189,12 @@ def log_remarks(logs: Iterable[Recording]) -> dict[str, list[Remark]]:
 def robot_record(robot: Robot) -> Record:
     """The robot in use: a built-in profile by its name, not its path."""
     # Its path differs between machines; name and digest are enough.
-    built_in = robot.path in PROFILES.values()
+    path, built_in = robot.path, robot.path in PROFILES.values()
     return {
         "name": robot.name,
         "title": robot.title,
-        "file": None if built_in else robot.path and str(robot.path),
-        "sha256": file_sha256(robot.path),
+        "file": None if built_in else path and str(path),
+        "sha256": digest(path) if path is not None and path.is_file() else None,
         "torque_source": robot.torque_source,
         "friction": [joint.model for joint in robot.friction] or "none",
         "payload_kg": robot.payload and robot.payload.mass,
@@ -204,13 +203,8 @@ def robot_record(robot: Robot) -> Record:
     }
 
 
-def file_sha256(path: Path | None) -> str | None:
-    """Hex digest of a file's bytes, None where there is no file."""
-    return digest(path) if path is not None and path.is_file() else None
-
-
 def observer_record(observer: Observer, tuning: Tuning | None) -> Record:
-    """An observer's parameters, and their meaning at the log's sample time."""
+    """An observer's parameters, and their meaning for the log."""
     # The observer that ran is inside, with the log's gains.
     inner: Any = getattr(observer, "observer", observer)
     own = [field.name for field in fields(inner) if field.init] if is_dataclass(inner) else []

@@ -1,8 +1,4 @@
-"""A command's screen on its logs, for any terminal.
-
-Facts, the answer, |F| as bars, the contacts, whether to believe it, the errors, and what was
-written: forty lines at most.
-"""
+"""A command's screen on its logs, for any terminal: forty lines at most."""
 
 import textwrap
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -27,22 +23,9 @@ from vftcli.outputs.believability import (
     log_line,
     own_match,
 )
-from vftcli.outputs.contacts import (
-    LEGEND,
-    contact_grid,
-    forces_along,
-    hardest_rows,
-    otherwise,
-)
+from vftcli.outputs.contacts import LEGEND, contact_grid, forces_along, hardest_rows, otherwise
 from vftcli.outputs.examination import rate_of, refused_codes
-from vftcli.outputs.grid import (
-    DASH,
-    GridCell,
-    keyed_grid,
-    percent,
-    significant,
-    terminal,
-)
+from vftcli.outputs.grid import DASH, GridCell, keyed_grid, percent, significant, terminal
 from vftcli.outputs.grids import contact_grids
 from vftcli.signals.arrays import Array
 from vftcli.signals.parsing import printable
@@ -99,7 +82,7 @@ class Canvas(NamedTuple):
         return text.translate(PLAIN).encode("ascii", "replace").decode()
 
     def wrapped(self, text: str, indent: int, lines: int | None = None) -> list[str]:
-        """A text in at most `lines` lines, behind an indent from the second on."""
+        """A text in at most `lines` lines, with an indent from the second."""
         found = textwrap.wrap(
             text,
             self.width - indent,
@@ -197,7 +180,7 @@ def written_lines(
 
 
 def list_lines(found: ContactList, most: int | None, canvas: Canvas) -> list[str]:
-    """The rows of a list, and a sentence on the rest of its log."""
+    """The rows of a list, and the rest of its log."""
     contacts, rest = found.contacts, otherwise(found)
     if not contacts and (most is not None or not found.candidates):
         return [f"  {rest}"] if rest else []
@@ -230,7 +213,7 @@ def belief_lines(found: Sequence[Ground], canvas: Canvas, most: int | None) -> l
 def ground_lines(
     ground: Ground, canvas: Canvas, most: int | None, about: str = ""
 ) -> Iterator[str]:
-    """Lines of one ground: mark, subject and sentence; then its remedy."""
+    """Lines of one ground: mark, subject, sentence; then its remedy."""
     subject, indent = f"{about}: {ground.subject}" if about else ground.subject, SUBJECT + 5
     first, *more = canvas.wrapped(printable(ground.sentence), indent, most)
     mark = canvas.painted(canvas.shown(MARKS[ground.standing]), ground.standing)
@@ -271,7 +254,7 @@ def logs_screen(
     *,
     every: bool = False,
 ) -> str:
-    """The screen of several logs: a line each, then the worst findings."""
+    """The screen of several logs: a line each, then findings."""
     lines = [log_line(analysis) for analysis in analyses]
     free = dict.fromkeys(r.recording.name for a in analyses for r in a.motion.runs)
     parts = (
@@ -325,7 +308,7 @@ def log_table(
 
 
 def force_bars(t: Array, force: Array, contacts: Sequence[Contact], canvas: Canvas) -> list[str]:
-    """|F| [N] over time [s] as bars, above seconds and the contacts' numbers. (T,)"""
+    """|F| [N] as bars, above seconds and contacts' numbers. (T,)"""
     top = force.max()
     labels = [f"{top * row / (ROWS - 1):.0f}" for row in range(ROWS)]
     left = max(map(len, labels))
@@ -349,7 +332,7 @@ def force_bars(t: Array, force: Array, contacts: Sequence[Contact], canvas: Canv
 
 
 def column_peaks(t: Array, force: Array, columns: int) -> Array:
-    """The largest |F| in each of so many equal spans of time. (columns,) [N]"""
+    """The largest |F| in each of equal spans of time. (columns,) [N]"""
     edges = np.linspace(t[0], t[-1], columns + 1)
     # A span without a sample is interpolated.
     peaks = np.interp(0.5 * (edges[1:] + edges[:-1]), t, force)
@@ -374,7 +357,7 @@ def seconds(t: Array, columns: int) -> str:
 
 
 def placed(texts: Iterable[tuple[int, str]], columns: int) -> str:
-    """A line with texts at their places, without those that would overlap."""
+    """A line with texts at their places, none over another."""
     line = [" "] * (columns + 8)
     for at, text in texts:
         around = line[max(at - 1, 0) : at + len(text) + 1]

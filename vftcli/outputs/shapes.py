@@ -100,7 +100,7 @@ def fewer(corners: Array) -> Surface:
 
 
 def merged(corners: Array, size: float) -> tuple[Index, Index]:
-    """Cell of each corner, and triangles between three cells, each once. (F, 3)"""
+    """Cells of corners, and triangles between three cells, once. (F, 3)"""
     places = np.floor(corners / size).astype(np.int64)
     x, y, z = np.moveaxis(places - places.min(axis=(0, 1)), -1, 0)
     _, cells = np.unique((x * (y.max() + 1) + y) * (z.max() + 1) + z, return_inverse=True)
@@ -122,6 +122,6 @@ def spot_of(contact: Contact, joints: int) -> tuple[int, int]:
 
 
 def touched_point(contact: Contact, origins: Array) -> Array:
-    """Place of a force, by origins of links and flange (S, n+1, 3). (S, 3) [m]"""
+    """Place of a force, by frames' origins (S, n+1, 3). (S, 3) [m]"""
     first, last = spot_of(contact, origins.shape[1] - 1)
     return 0.5 * (origins[:, first - 1] + origins[:, last - 1])

@@ -65,7 +65,7 @@ def thresholds_text(
 
 
 def thresholds_grid(thresholds: Thresholds) -> Grid:
-    """Every threshold with its interval, and the log that it comes from."""
+    """Every threshold with its interval and its log."""
     rows: Rows = []
     for name, unit, level, one in thresholds.named:
         span, t = DASH.join(map(significant, one.interval)), one.tail
@@ -162,7 +162,7 @@ def calls(thresholds: Thresholds) -> dict[str, str]:
 
 
 def are_known(thresholds: Sequence[SignalThreshold]) -> bool:
-    """Whether there are thresholds of the wrench, and none of them is wide."""
+    """Whether thresholds are there, and none is wide."""
     return bool(thresholds) and not any(one.is_wide for one in thresholds)
 
 
@@ -173,7 +173,7 @@ def lower(thresholds: Sequence[SignalThreshold]) -> list[float]:
 
 
 def upper(thresholds: Sequence[SignalThreshold]) -> list[float]:
-    """Upper ends of their intervals, if known, at which the robot stops. [N·m, N]"""
+    """Upper ends of their intervals, if known. [N·m, N]"""
     ends = ((one, one.interval[1]) for one in thresholds)
     return lower([one if isnan(end) else one._replace(value=end) for one, end in ends])
 

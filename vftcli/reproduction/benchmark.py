@@ -63,7 +63,7 @@ class BenchmarkRun:
     tell: Tell = field(repr=False)
     #: Name of each piece of work → how it ended.
     ended: dict[str, Outcome[Any]] = field(default_factory=dict)
-    #: Name → log to score, as its entry has it or with the file that was made of that.
+    #: Name → log to score, its entry's or with the made file.
     logs: dict[str, BenchmarkLog] = field(default_factory=dict)
     #: Name → file of each trained robot.
     robots: dict[str, Path] = field(default_factory=dict)
@@ -104,7 +104,7 @@ class BenchmarkRun:
     def made(
         self, file: str, sources: Sequence[Path], options: object, work: Callable[[Path], object]
     ) -> Path | None:
-        """A file made of others and options, if not there yet; None if that fails."""
+        """A file made of others and options, if new; None if that fails."""
         name = Path(file).stem
         key = key_of(content_digest(sources), options_digest(options))
         path = self.folder.made(f"{name}-{key[:8]}") / file
@@ -151,7 +151,7 @@ class BenchmarkRun:
             self.robots[robot.name] = path
 
     def tasks(self) -> Iterator[ScoreTask]:
-        """A task a log and protocol, and a log of an arm with outside estimates."""
+        """A task a log and protocol, and for outside estimates."""
         logs = self.logs
         for log in logs.values():
             words: dict[str, dict[str, object]] = {"alone": {}}

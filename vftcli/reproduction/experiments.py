@@ -1,7 +1,6 @@
 """Experiments of a paper, each once a seed, and their results beside its print.
 
-A run has its own seed, so its numbers do not depend on the others. A page, its tables as
-Markdown and figures show them.
+A run has its own seed, so its numbers do not depend on the others.
 """
 
 from collections import defaultdict
@@ -19,16 +18,7 @@ from vftcli.batch import WorkersChoice
 from vftcli.batch.cluster import perform, run_tasks
 from vftcli.outputs.charts import Chart
 from vftcli.outputs.files import SEAL, OutputFolder
-from vftcli.outputs.grid import (
-    DASH,
-    Column,
-    Grid,
-    GridCell,
-    Rows,
-    markdown,
-    minus,
-    significant,
-)
+from vftcli.outputs.grid import DASH, Column, Grid, GridCell, Rows, markdown, minus, significant
 from vftcli.outputs.page.shell import page
 from vftcli.outputs.paper import Drawing, figure_files, line_figure, plots_of, write_figures
 from vftcli.outputs.run_record import envelope, seal
@@ -64,7 +54,7 @@ Result = RunResult | str  #: A job's results, or the one line of its failure.
 
 
 def experiments_of(paper: Paper, names: Sequence[str], *, fast: bool) -> list[Experiment]:
-    """The experiments of these items, with the first seed alone if `fast`."""
+    """The experiments of these items, with one seed if `fast`."""
     wanted = {e for name in names for e in paper.items[name].experiments}
     own = (e for name, e in paper.experiments.items() if name in wanted)
     return [replace(e, seeds=e.seeds[: 1 if fast else None]) for e in own]
@@ -85,7 +75,7 @@ def run_job(job: Job) -> RunResult:
 def run_jobs(
     experiments: Sequence[Experiment], workers: int | None = None
 ) -> list[tuple[str, Result]]:
-    """Experiment and results, a pair a seed; timed ones run last, alone."""
+    """Experiment and results by seed; timed ones run last, alone."""
     jobs = [(e, seed) for e in experiments for seed in e.seeds]
     stage(f"{len(jobs)} runs")
     alone, found = (job for job in jobs if job[0].alone), dict[tuple[str, int], Result]()
@@ -107,7 +97,7 @@ def run_jobs(
 def gather(
     paper: Paper, names: Sequence[str], results: Iterable[tuple[str, Result]]
 ) -> dict[str, PaperItem]:
-    """Name of an item → it with its results, each a list over the seeds."""
+    """Name of an item → it with its results, lists over the seeds."""
     found = {}
     for name in names:
         item = paper.items[name]
@@ -176,7 +166,7 @@ def beside_print(item: PaperItem) -> str:
 
 
 def overview(found: Mapping[str, PaperItem]) -> Grid:
-    """Every item in a row: its title, ours over the print, and its verdict."""
+    """Every item in a row: title, ours over the print, verdict."""
     rows: Rows = []
     for name, item in found.items():
         link = f'<a href="#{name}">{escape(item.label)}</a>'

@@ -64,7 +64,7 @@ UNTOUCHED = 0.5  #: The arm is untouched below this true flange force. [N]
 
 
 def dragged_sensor(seed: int, *, sensor_pose: str, unloaded: Sequence[float]) -> Iterator[Given]:
-    """RMSE of the virtual sensor against the real one, in flange axes."""
+    """RMSE of the virtual sensor against the real one."""
     robot, (start, stop) = load_robot("ur5"), unloaded
     # With a soft position loop joints slide where a stiff one holds them.
     hard, soft = (
@@ -126,7 +126,7 @@ def assembled_bearing(
     phases: Mapping[str, Sequence[float]],
     sampled: float,
 ) -> Iterator[Given]:
-    """Zero drift, the bearing's weight, errors by phase, controllers' results."""
+    """Zero drift, the bearing's weight, errors, controllers."""
     run = simulate(load_scenario("panda-bearing", ()), seed)
     recording, robot = run.recording, load_robot("panda")
     asked = WrenchChoice(frame="base")
@@ -186,7 +186,7 @@ def replay_bearing(wrench: Wrench, made: Analysis, control: ControlChoice) -> Re
 
 
 def motion_under_knocks(variant: str, found: Replay, knocked: Sequence[float]) -> Iterator[Given]:
-    """Return time of a guided arm, its rest, and its motion under knocks."""
+    """Return of a guided arm, its rest, its motion under knocks."""
     t, (start, stop) = found.motion.t, knocked
     for n, controller in enumerate(found.controllers):
         x, kind = found.motion.x[:, n, :3], controller.kind
@@ -276,7 +276,7 @@ def ungated(found: Replay) -> Replay:
 
 
 def return_values(variant: str, found: Replay, held: Sequence[Latency]) -> Iterator[Given]:
-    """By contact and α: lead of the peak and the turn, and time back."""
+    """By contact and α: lead of peak and turn, time back."""
     for k, one in enumerate(held, start=1):
         axes = COORDINATES[FORCE if one.axis < 3 else MOMENT]
         rows = [
@@ -304,7 +304,7 @@ def law_of(row: Record) -> str:
 
 
 def turn_after(found: Replay, n: int, row: Record) -> float:
-    """Time from release until an axis stops moving away from its target. [s]"""
+    """Time from release until an axis stops moving away. [s]"""
     t, axis = found.motion.t, COORDINATES.index(row["axis"])
     start = int(t.searchsorted(row["release_s"] - 1e-9))
     outward = np.sign(found.motion.x[start, n, axis]) * found.motion.v[start:, n, axis]
@@ -339,7 +339,7 @@ def latest_turns(_seed: int, *, alphas: Sequence[float]) -> Iterator[Given]:
 def released(
     _seed: int, *, robot: str, deviation: float, alphas: Sequence[float] = ()
 ) -> Iterator[Given]:
-    """Parameters of a table; its return from a deviation [m] at rest."""
+    """Parameters of a table; return from a deviation [m]."""
     arm, x = load_robot(robot), np.eye(6)[0] * deviation
     for variant, xi in ((CORRECTED, ()), ("ξ = 1", ("admittance.xi=1",))):
         control = ControlChoice(assignments=xi, alphas=tuple(alphas))

@@ -89,7 +89,7 @@ class BenchmarkLog:
     free: tuple[str, ...] = ()  #: Motion that nobody touched: names of logs, or A:B.
     identified: str = ""  #: Name of the ``[[robot]]`` of protocol 3.
     truth_error: TruthError = field(default_factory=TruthError)
-    exact_model: bool = False  #: Simulated, or torque made from the model: in no headline.
+    exact_model: bool = False  #: Torque made from the model: in no headline.
     options: tuple[tuple[str, Any], ...] = ()  #: Options of `vftcli estimate`, as typed.
 
     def __post_init__(self) -> None:
@@ -142,7 +142,7 @@ class BenchmarkLog:
         return [word for word in self.free if ":" not in word]
 
     def choice(self, **words: object) -> AnalysisChoice:
-        """Choices of its analysis: the options of its entry, then these words."""
+        """Choices of its analysis: its entry's options, then these words."""
         own = {"frame": "base", "wrench": True, **dict(self.options), **words}
         made = choice_of(Asked(own, {}, ""), Library(), Examiner())
         return cast("AnalysisChoice", with_files(made, absolute))
@@ -150,7 +150,7 @@ class BenchmarkLog:
 
 @dataclass(frozen=True, kw_only=True)
 class TrainedRobot:
-    """A robot file of `vftcli identify` from other logs: an entry ``[[robot]]``."""
+    """A robot file from other logs: an entry ``[[robot]]``."""
 
     name: str
     train: tuple[str, ...]  #: Names of logs.
@@ -161,7 +161,7 @@ class TrainedRobot:
 
 @dataclass(frozen=True, kw_only=True)
 class Rival:
-    """Outside estimates, a row of their own, as ``rival.toml`` beside them declares."""
+    """Outside estimates, as ``rival.toml`` beside them declares."""
 
     name: str
     folder: str
@@ -200,7 +200,7 @@ class Manifest:
                 check_known(word, names, f"log {log.name}: no free log {word!r}")
 
     def leaks(self, log: BenchmarkLog, protocol: str) -> Iterator[str]:
-        """Reasons for unfair rows of a protocol: a line per training log."""
+        """Reasons for unfair rows: a line a training log."""
         # The log itself by its spans, others whole.
         words = [(log.base, word) if ":" in word else (word, "0:") for word in log.free]
         key, used = protocol, words if protocol == "free" else []
@@ -225,7 +225,7 @@ class Manifest:
                 yield f"{what} is of the same day, {log.day}"
 
     def complaints(self, rivals: Sequence[Rival]) -> list[tuple[str, str]]:
-        """Entry and line of what is unfair or another file, of logs that are there."""
+        """Entry and line of what is unfair or another file."""
         found: dict[tuple[str, str], None] = {}  # an entry with pushes has every line once
         for log in self.logs.values():
             if log.missing:
@@ -331,7 +331,7 @@ def rival_of(text: str, logs: Mapping[str, BenchmarkLog]) -> Rival:
 
 
 def read_parts(log: BenchmarkLog) -> dict[str, Array]:
-    """Columns t, q1… of an entry's text files, one a signal, t first."""
+    """Columns t, q1… of an entry's text files, t first."""
     columns: dict[str, Array] = {}
     samples = 0
     for part, path in zip(log.parts, log.paths, strict=True):

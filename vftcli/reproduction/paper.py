@@ -31,7 +31,8 @@ class Experiment:
     run: str  #: Name of the function that runs it.
     given: Mapping[str, Any] = field(default_factory=dict)  #: Its arguments beside the seed.
     seeds: Sequence[int] = (1, 2, 3, 4, 5)
-    alone: bool = False  #: Whether it measures time, so that nothing may run beside it.
+
+    alone: bool = False  #: Whether it measures time: nothing may run beside.
 
 
 class PrintedLine(NamedTuple):
@@ -54,7 +55,7 @@ class PrintedLine(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True)
 class PaperItem:
-    """A table or a figure of the paper, or a conclusion; once run, with its results."""
+    """A table or a figure of the paper; once run, with its results."""
 
     label: str  #: Its name in the paper.
     title: str
@@ -131,9 +132,7 @@ def lines_of(row: Sequence[Any], each: Mapping[str, Mapping[str, str]]) -> Itera
         keys = {name: key for name, (key, _) in each_name.items()}
         words = {name: word for name, (_, word) in each_name.items()}
         yield line._replace(
-            key=line.key.format(**keys),
-            label=line.label.format(**words),
-            printed=number,
+            key=line.key.format(**keys), label=line.label.format(**words), printed=number
         )
 
 

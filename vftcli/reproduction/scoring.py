@@ -79,7 +79,7 @@ class ScoreTask(NamedTuple):
 
 
 class KnownTruth(NamedTuple):
-    """True contact of a log's arm, on the log's clock; None where unknown."""
+    """True contact of an arm, on its log's clock; None where unknown."""
 
     tau: Array | None = None  #: External torque on the robot. (T, n)
     wrench: Array | None = None  #: On the flange, base axes. (T, 6)
@@ -97,7 +97,7 @@ class Answer(NamedTuple):
 
 
 def score_log(task: ScoreTask) -> None:
-    """Score a log by a protocol and write its rows, unless they are there."""
+    """Score a log by a protocol and write its rows, if missing."""
     folder, log, rival = BatchFolder(task.folder), task.log, task.rival
     if folder.row_file(task.key).exists():
         return
@@ -142,7 +142,7 @@ def truth_of(log: BenchmarkLog, recording: Recording, robot: Robot) -> KnownTrut
 
 
 def own_answers(run: Run, choice: AnalysisChoice, log: BenchmarkLog) -> Iterator[Answer]:
-    """Answers of zero, the vendor and our observers, `best` with its contacts."""
+    """Answers of zero, vendor and our observers, `best` with contacts."""
     recording, t, begun = run.recording, run.t, thread_time()
     made = analyse(run, choice)
     us = 1e6 / len(t)
@@ -258,7 +258,7 @@ def worst_of(torque: ExternalTorque, truth: Array, scored: Mask) -> Record:
 
 
 def weighed(up: Array, weight: float, w: Array) -> Record:
-    """Mean and rms error of a carried weight [N], and the share of answered time."""
+    """Mean and rms error of a carried weight [N], share of answered time."""
     known = np.isfinite(up)
     total = float(w[known].sum()) or np.nan
     mean, square = (float((w * x)[known].sum()) / total for x in (up, (up - weight) ** 2))

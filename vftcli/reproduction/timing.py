@@ -1,7 +1,6 @@
 """Computing times: Table II by the paper's way and by ours, and `benchmark speed`.
 
-Rounds of all are interleaved, so that a machine's drift of speed affects all. Medians
-over the rounds are reported.
+Rounds of all are interleaved, so that a machine's drift of speed affects all.
 """
 
 import os
@@ -32,7 +31,7 @@ JITTER = 0.05  #: Jitter of a step, as a share of the mean step. [1]
 RNEA = "rnea loop"  #: Name of the yardstick, a loop of Pinocchio's `rnea`.
 #: Dynamics and four observers over it, on an even and a jittering clock.
 RATIOS = ("core_over_rnea_loop", "core_over_rnea_loop_jittering")
-#: Line of the paper's Table II → its total times over 30 060 samples on its laptop. [s]
+#: Line of the paper's Table II → its times of 30 060 samples. [s]
 PRINTED = {line.key: line.number for line in PAPERS["huang2025"].items["table2"].lines}
 
 Name = TypeVar("Name")
@@ -52,7 +51,7 @@ def median_times(work: Mapping[Name, Work], rounds: int) -> dict[Name, float]:
 
 @contextmanager
 def one_core() -> Iterator[None]:
-    """Keep this process on one core in a measurement, if the system allows."""
+    """Keep this process on one core for a block, if possible."""
     if not hasattr(os, "sched_setaffinity"):
         yield
         return
@@ -65,7 +64,7 @@ def one_core() -> Iterator[None]:
 
 
 def circle(robot: Robot, samples: int) -> Recording:
-    """A smooth periodic motion of an arm with plausible currents, seed 0."""
+    """A smooth periodic motion with plausible currents, seed 0."""
     rng = np.random.default_rng(0)
     t = np.arange(samples) / 125.0
     phase = rng.uniform(0.0, 2.0 * np.pi, robot.joints)
@@ -139,10 +138,10 @@ def benchmark(robot_name: str, samples: int, rounds: int) -> dict[str, Any]:
 
 
 def computing_time(_seed: int) -> Iterator[Given]:
-    """Seconds for the paper's samples by observer, with dynamics; printed ratios."""
+    """Seconds for the paper's samples by observer; printed ratios."""
     robot, ours = load_robot("ur5"), benchmark("ur5", SAMPLES, ROUNDS)
     rows = {row["name"]: row["total_s"] for row in ours["observers"]}
-    # The paper's way, sample by sample, runs over fewer samples and is scaled.
+    # The paper's way runs over fewer samples and is scaled.
     log = circle(robot, SCRIPT_SAMPLES)
     terms, step = dynamics_terms(log, robot), log.median_step
     kalman = KalmanObserver(discretisation="zoh", r_diag=0.5, q_p_diag=0.01, q_tau_diag=5000.0)
@@ -190,7 +189,7 @@ def taylor_exponential(A: Array) -> Array:
 
 
 def held_matrices(step: float, q_p: Array, q_tau: Array) -> tuple[Array, Array, Array]:
-    """A, B (43) and Q (44, corrected) of the zero-order hold, by Taylor series."""
+    """A, B (43) and Q (44, corrected) of the zero-order hold."""
     n = len(q_p)
     A_c, B_c = np.eye(2 * n, k=n), np.eye(2 * n, n)
     both = taylor_exponential(np.block([[A_c, B_c], [np.zeros((n, 3 * n))]]) * step)

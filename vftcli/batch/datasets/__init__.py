@@ -58,7 +58,7 @@ FILMS = frozenset({".mp4", ".svo", ".svo2", ".mkv", ".webm", ".avi", ".png", ".j
 
 
 def check_copy(dataset: Path, copy: Path, *, force: bool) -> None:
-    """Raise an OutputError before any work if no copy may be made at a path."""
+    """Raise an OutputError if no copy may be made at a path."""
     source, target = dataset.resolve(), copy.resolve()
     if source == target or source in target.parents or target in source.parents:
         how = "are the same folder" if source == target else "are one inside the other"
@@ -114,7 +114,7 @@ def unfinished(copy: Path, key: str) -> Iterator[Path]:
 
 
 def emptied(folder: Path, keep: Path) -> None:
-    """Empty a folder of an earlier run and its folder `keep`, which remains."""
+    """Empty a folder and its folder `keep`, which remains."""
     for path in (*folder.iterdir(), *keep.iterdir()):
         if path == keep:
             continue
@@ -125,7 +125,7 @@ def emptied(folder: Path, keep: Path) -> None:
 
 
 def take_place(partial: Path, copy: Path) -> None:
-    """Give a finished copy its name; an earlier copy under that name goes."""
+    """Give a finished copy its name; an earlier copy goes."""
     earlier = copy.with_name(f"{copy.name}.earlier")
     shutil.rmtree(earlier, ignore_errors=True)
     if copy.exists():
@@ -141,7 +141,7 @@ def take_place(partial: Path, copy: Path) -> None:
 
 @contextmanager
 def finished(path: Path) -> Iterator[Path]:
-    """Path for a file of a copy; it gets its name when the block ends well."""
+    """Path for a file of a copy, named when the block ends well."""
     path.parent.mkdir(parents=True, exist_ok=True)
     temporary = path.with_name(f"{path.name}.partial")
     yield temporary
@@ -161,7 +161,7 @@ def stored_rows(path: Path) -> dict[str, NDArray[Any]]:
 
 
 def copy_others(folder: Path, partial: Path, done: Collection[Path]) -> None:
-    """Copy all other files of a dataset; films are linked where possible."""
+    """Copy all other files of a dataset; films are linked."""
     for inside, source in files_within(folder):
         if inside in done:
             continue
@@ -176,7 +176,7 @@ def copy_others(folder: Path, partial: Path, done: Collection[Path]) -> None:
 
 
 def files_within(folder: Path) -> Iterator[tuple[Path, Path]]:
-    """Every file of a dataset: its path in the folder, and its real path."""
+    """Every file of a dataset: its path there, and its real path."""
     top = folder.resolve()
     # A hub's cache keeps the files of all snapshots once, beside these.
     tops = (top, top.parents[1] / "blobs") if top.parent.name == "snapshots" else (top,)

@@ -43,7 +43,7 @@ class Hdf5Dataset:
         return path, episode_places(open_log(path), self._columns)
 
     def frames(self, file: DataFile, number: int) -> int:
-        """Number of an episode's frames: those of the first set beside positions."""
+        """Number of an episode's frames, by a set beside positions."""
         import h5py
 
         path, places = self._places(file)

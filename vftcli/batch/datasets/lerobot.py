@@ -1,7 +1,4 @@
-"""LeRobot datasets written back: columns, info.json, metadata and statistics.
-
-Statistics are of each episode and of all.
-"""
+"""LeRobot datasets written back: columns, info.json, metadata and statistics."""
 
 import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -42,7 +39,7 @@ class LeRobotDataset:
             yield DataFile(place, self.folder, tuple(own))
 
     def _opened(self, file: DataFile) -> tuple[Path, Any, Column]:
-        """A data file in pyarrow, and each row's episode (empty if it holds one)."""
+        """A data file in pyarrow, and each row's episode, empty of one."""
         path = self.folder / file.place
         table = ParquetTable(open_log(path))
         return path, table.file, table.episodes()
@@ -101,7 +98,7 @@ class LeRobotDataset:
                 )
 
     def finish(self, columns: ForceColumns, statistics: OfEpisodes, copy: Path) -> None:
-        """Write info.json with the new features, and their statistics beside others."""
+        """Write info.json with the new features, and their statistics."""
         info = info_of(self.folder)
         third = str(info.get("codebase_version", "")).startswith("v3")
         fps = {"fps": info["fps"]} if third and "fps" in info else {}
@@ -207,7 +204,7 @@ def with_features(metadata: Mapping[bytes, bytes], columns: ForceColumns) -> dic
 
 
 def statistics_of(values: Single) -> Statistics:
-    """Statistics of one episode (frames, k), exact quantiles. (k,) each, count (1,)"""
+    """Statistics of an episode (frames, k). (k,) each, count (1,)"""
     exact = values.astype(np.float64)
     found = {
         "min": exact.min(axis=0),

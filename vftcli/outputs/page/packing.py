@@ -22,7 +22,7 @@ from vftcli.signals.arrays import Array, gaps_of
 WHOLE, STRETCHES = 8192, 4096
 COARSE = 4  #: Stretches in one value of a line hidden at first.
 AROUND = 0.5  #: Time of short stretches before and after a contact. [s]
-#: Unit → largest step of a value: below every band, and 2e-4 rad on 1.3 m are 0.3 mm.
+#: Unit → largest step of a value: below every band; 2e-4 rad are 0.3 mm.
 LARGEST = {"N·m": 0.01, "N": 0.1, "rad": 2e-4}
 FEWEST = 1000  #: Least steps between zero and the largest value.
 MOST, UNKNOWN = 32767, -32768  #: Largest number of steps; number for NaN.
@@ -37,7 +37,7 @@ class Blob:
         self.rows: list[np.ndarray[Any, np.dtype[np.int16]]] = []  #: The rows in steps.
 
     def add(self, values: Array, step: float) -> int:
-        """Number of a new row; its step grows if the values do not fit."""
+        """Number of a new row; its step grows where values do not fit."""
         step = max(step, largest(values) / MOST) or 1.0
         steps = np.where(np.isfinite(values), np.rint(values / step), UNKNOWN)
         self.rows.append(steps.astype(np.int16))
@@ -45,7 +45,7 @@ class Blob:
         return len(self.rows) - 1
 
     def data(self) -> Record:
-        """The script's packed data: high bytes of differences, then low ones."""
+        """The packed data: high bytes of differences, then low ones."""
         changes = [np.diff(row, prepend=np.int16(0)) for row in self.rows]
         joined = np.concatenate(changes or [np.empty(0, np.int16)])
         # Zigzag: small changes of either sign are small numbers.
@@ -64,7 +64,7 @@ class PageClock:
         gaps, first, half = gaps_of(t, GAP_STEPS) + 1, np.arange(len(t)), np.array(0)
         self.blob, self.t, self.whole = blob, t, len(t) <= WHOLE
         if not self.whole:
-            # Half of the stretches are near the spans; none reaches over a gap.
+            # Half of the stretches are near spans; none crosses a gap.
             near = within(t, [(start - AROUND, stop + AROUND) for start, stop in spans])
             share, weight = near.mean(), np.ones(len(t))
             if 0 < share < 1:
@@ -91,7 +91,7 @@ class PageClock:
         return self.blob.add(values[self.samples], LARGEST["rad"])
 
     def ends(self, values: Array, unit: str, every: int = 1) -> tuple[int, int | None]:
-        """Rows of the lowest value of each stretch, and of the highest above it. (T,)"""
+        """Rows of each stretch's lowest value, and of the highest above it. (T,)"""
         step, add = step_of(values, unit), self.blob.add
         if self.whole:
             return add(values, step), None

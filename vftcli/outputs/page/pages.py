@@ -14,13 +14,7 @@ from vftcli.analysis import Analysis
 from vftcli.contacts.contact_list import ContactList
 from vftcli.observers.table import OBSERVERS
 from vftcli.outputs import Record
-from vftcli.outputs.believability import (
-    LOG_COLUMNS,
-    LogSummary,
-    grounds,
-    headline,
-    least_error,
-)
+from vftcli.outputs.believability import LOG_COLUMNS, LogSummary, grounds, headline, least_error
 from vftcli.outputs.contacts import hardest_rows, otherwise
 from vftcli.outputs.error_tables import axis_grids, blocks, nothing_to_compare, rmse_grid
 from vftcli.outputs.examination import rate_of
@@ -154,7 +148,7 @@ def lead_sentences(analysis: Analysis) -> list[str]:
 
 
 def errors_view(analysis: Analysis) -> Record:
-    """Tables of errors and their summary; no tables without a reference."""
+    """Tables of errors, if any, and their summary."""
     table, found = analysis.errors, blocks(analysis.errors)
     if table is None or not found:
         return {"state": "none given", "first": ()}
@@ -251,7 +245,7 @@ def render_logs(
     analyses: Sequence[Analysis] = (),
     below: str = "",
 ) -> str:
-    """The page of several logs: a report's with their `analyses`, or a batch's."""
+    """The page of several logs: a report's with `analyses`, or a batch's."""
     title, lead = logs_headline(lines)
     robots = dict.fromkeys(line.robot for line in lines)
     each = zip(lines, analyses, strict=False)

@@ -39,7 +39,7 @@ TICK_ROOM = 1.4  #: Factor by which a tick's distance may be too small.
 
 
 def capital(text: str) -> str:
-    """A text with a capital first, unless it begins with a file or an option."""
+    """A text with a capital, unless a file or an option begins it."""
     first, space, rest = text.partition(" ")
     return f"{first.capitalize()}{space}{rest}" if PLAIN(first) else text
 
@@ -52,7 +52,7 @@ def worst_first(remarks: Iterable[Remark]) -> list[str]:
 
 @cache
 def templates() -> "Environment":
-    """The templates: they escape texts; an undefined name raises."""
+    """The templates: texts are escaped, an undefined name raises."""
     from jinja2 import Environment, FileSystemBytecodeCache, FileSystemLoader, StrictUndefined
     from jinja2.bccache import Bucket
     from markupsafe import Markup
@@ -134,7 +134,7 @@ def page(
 
 
 def script_json(data: object) -> str:
-    """JSON for a ``<script type="application/json">`` that cannot end the element."""
+    """JSON for a ``<script>`` element that it cannot end."""
     # "<" could begin "</script>"; two separators end JavaScript's lines.
     text = json.dumps(data, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
     return text.replace("<", "\\u003c").replace("\u2028", " ").replace("\u2029", " ")
@@ -169,7 +169,7 @@ class Scales(NamedTuple):
         return self.floor - share * (self.floor - self.box.top)
 
     def near(self, y: Array) -> Array:
-        """Vertical places; those far outside the chart are moved near it."""
+        """Vertical places; those far outside are moved near the chart."""
         height = self.y.high - self.y.low
         return self.up(np.clip(y, self.y.low - height, self.y.high + height))
 
@@ -216,7 +216,7 @@ def scales_of(chart: Chart, box: Box) -> Iterator[Scales]:
 
 
 def strokes(scales: Scales, chart: Chart, line: ChartLine, panel: int) -> tuple[str, str, str]:
-    """A line's paths in a panel: ribbon, its grey part, line; "" for none."""
+    """Paths of a line in a panel: ribbon, grey part, line; "" for none."""
     t, y, halves = drawn_line(chart, line, panel)
     own, quiet = (
         (ribbon(scales, t, y - half, y + half) for half in halves) if halves else ("", "")
@@ -225,14 +225,14 @@ def strokes(scales: Scales, chart: Chart, line: ChartLine, panel: int) -> tuple[
 
 
 def path_of(scales: Scales, t: Array, y: Array) -> str:
-    """A line as the text of an SVG path, broken at unknown values."""
+    """A line as an SVG path, broken at unknown values."""
     points = np.column_stack([scales.across(t), scales.near(y)])
     runs = runs_of(np.isfinite(points.sum(axis=1)))
     return "".join(polyline(points[start:stop]) for start, stop in runs)
 
 
 def polyline(points: Array | Sequence[Array]) -> str:
-    """Points as the text of an SVG path, to a tenth; a single one is a dot. (K, 2)"""
+    """Points as an SVG path, to a tenth; a single one is a dot. (K, 2)"""
     tenths = np.rint(10.0 * np.asarray(points)).astype(int)
     first, *moves = np.vstack([tenths[:1], np.diff(tenths, axis=0)]).tolist()
     # From point to point: "l.5-1.1.6.2" is shorter than two places.
@@ -241,7 +241,7 @@ def polyline(points: Array | Sequence[Array]) -> str:
 
 
 def tenth(number: int) -> str:
-    """A number of tenths as a path's text, behind a sign or a space."""
+    """A number of tenths in a path, behind a sign or a space."""
     whole, rest = divmod(abs(number), 10)
     text = f"{whole or ''}.{rest}" if rest else f"{whole}"
     return f"-{text}" if number < 0 else f" {text}"

@@ -27,7 +27,7 @@ ASIDE, PITCH = 0.45, 0.3  #: Turn of the view from the arm's side, and downwards
 AWAY = 4.2  #: Distance of the camera, in reaches.
 POSES = 600  #: Most poses that the view is fitted to.
 WIDEST = np.pi / 4  #: Half the angle of the widest drawn cone. [rad]
-SHARES = 0.14, 0.6  #: Length of an arrow of no force, and the largest force's extra, in reaches.
+SHARES = 0.14, 0.6  #: Length of an arrow of no force, and the largest's more, in reaches.
 MILLIMETRE = 1e-3  #: Step of a surface's corners. [m]
 #: Size of the still drawing, and the part it fills.
 WIDTH, HEIGHT, FILLED = 624.0, 448.0, 0.92
@@ -43,7 +43,7 @@ class View(NamedTuple):
     reach: float  #: Largest distance of the flange from the base. [m]
 
     def seen(self, points: Array) -> Array:
-        """Points of the still drawing, downwards, depth, and units of 1 m there. (K, 4)"""
+        """Points of the still drawing, depth, and units of 1 m there. (K, 4)"""
         across, up, ahead = axes_of(self.yaw, self.pitch)
         moved, scale = points - self.centre, min(WIDTH / self.span[0], HEIGHT / self.span[1])
         near = FILLED * scale * self.nearness(points)
@@ -72,7 +72,7 @@ def axes_of(yaw: float, pitch: float) -> Array:
 
 
 def view_of(analysis: Analysis) -> View:
-    """The view of the arm in all its poses, with the arrows at their peaks."""
+    """The view of all poses of the arm, with its arrows."""
     q = analysis.recording.q
     known = q[np.isfinite(q).all(axis=1)]
     every = known[:: max(len(known) // POSES, 1)] if len(known) else np.zeros((1, q.shape[1]))
@@ -83,11 +83,8 @@ def view_of(analysis: Analysis) -> View:
     points += (arrow_of(analysis, contact, reach)[:1] for contact in sized)
     mean = flange.mean(axis=0)
     yaw = np.arctan2(mean[1], mean[0]) - ASIDE if np.hypot(*mean[:2]) > 0.05 else -ASIDE
-    axes, places, view = (
-        axes_of(yaw, PITCH),
-        np.vstack(points),
-        View(yaw, PITCH, mean, mean, reach),
-    )
+    axes, places = axes_of(yaw, PITCH), np.vstack(points)
+    view = View(yaw, PITCH, mean, mean, reach)
     for _ in range(3):
         # Near things look larger, which shifts the middle.
         x, y = ((places - view.centre) @ axes[:2].T * view.nearness(places)[:, None]).T
@@ -104,7 +101,7 @@ def pose_at(analysis: Analysis, t: float) -> Pose:
 
 
 def arrow_of(analysis: Analysis, contact: Contact, reach: float) -> Array:
-    """Tail and tip of a contact's force at its peak; it acts at the tip. (2, 3) [m]"""
+    """Tail and tip of a contact's force at its peak. (2, 3) [m]"""
     (tip,) = touched_point(contact, pose_at(analysis, contact.peak).translation)
     share = min((contact.peak_force or 0.0) / most_force(analysis.listed), 1.0)
     return np.vstack([tip - reach * (SHARES[0] + SHARES[1] * share) * along(contact), tip])
@@ -122,7 +119,7 @@ def most_force(contacts: Sequence[Contact]) -> float:
 
 
 def cone_of(contact: Contact) -> float:
-    """Half the angle of the 95 % cone about a force's direction. [rad]"""
+    """Half the angle of a force's 95 % cone. [rad]"""
     if contact.wrench_sd is None or not contact.peak_force:
         return 0.0
     # Mean variance of the two directions across the force.
