@@ -10,7 +10,7 @@ from vftcli.identification import friction_fit, methods
 from vftcli.identification.clean_fit import CleanFit
 from vftcli.identification.friction_fit import PreslidingScore, all_residuals, fit_frictions
 from vftcli.identification.links import stack
-from vftcli.identification.shapes import bent
+from vftcli.identification.shapes import Shape, bent
 from vftcli.identification.training import (
     moving_joints,
     prepare,
@@ -116,7 +116,7 @@ def test_a_rotor_inertia_is_known_or_the_profile_s_is_refuted(value, sd, taken, 
 def test_what_was_fitted_is_remarked_on_in_its_units(data, prepared):
     warm = prepared(T, dq=np.zeros((len(T), 3)), warmth=np.array([[0.9], [1.2]]))
     score = PreslidingScore(1e-3, {0.0: 1.0, 1e-3: 0.5})
-    fits = {2: SimpleNamespace(at_bound=("coulomb", "viscous"), presliding=score)}
+    fits = {2: SimpleNamespace(shape=Shape(("offset",)), scores={}, presliding=score)}
     remarks = list(methods.fit_remarks(data._replace(logs=(warm,)), fits))
     assert [(r.code, list(r.values.values())) for r in remarks] == [
         ("friction-at-bound", ["coulomb and viscous"]),

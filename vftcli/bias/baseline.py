@@ -4,6 +4,7 @@ The whole log's bias comes off μ before an observer runs: for `best`, tuned on 
 of the rest, and for the others if ``bias.method=whole-log``.
 """
 
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
@@ -61,11 +62,6 @@ class Baseline:
         """Let go of what the observers ran on, of a long log."""
         if self.motion.log.recording.samples > LONG:
             self._made.clear()
-
-    @property
-    def correction_sd(self) -> Array | None:
-        """Deviation of the model's error, None without a correction. (T, n) [N·m]"""
-        return None if self.correction is None else self.correction.sd
 
     def measured(self, part: FreePart) -> Spectra:
         """The spectra outside of the free part, and of the free samples."""
@@ -188,7 +184,17 @@ def find_baselines(motion: FreeMotion, choice: RefinementChoice, *, best: bool) 
         found = replace(found, on_correction=(failed,))
         return Baselines(plain=found, best=found)
     if found.spectra is None and bias.fitted:
-        found = on_quiet_samples(found, bias.free)
+        # In its place the samples that the fit calls free, if enough.
+        share = bias.free.mean()
+        remark = fact("free-by-the-fit", share=share)
+        if motion.choice.is_given and found.missing is not None:
+            # What was given is dropped, and why has to be said.
+            reason = found.missing.values["reason"]
+            remark = caution("free-by-the-fit-instead", share=share, reason=reason)
+        part = FreePart((RunSamples(motion.log, bias.free),), bias.free, (remark,))
+        made = replace(found, part=part, load=free_load(part.pieces), by_fit=True, missing=None)
+        with suppress(ParameterError):  # all of it or nothing is free, or never long enough
+            found = replace(made, spectra=made.measured(part))
     evened = () if motion.log is as_read else motion.log.recording.source.remarks[-1:]
     fitted = bias if bias.fitted else None
     made = replace(found, on_correction=(*evened, *bias.remarks), correction=fitted)
@@ -196,19 +202,3 @@ def find_baselines(motion: FreeMotion, choice: RefinementChoice, *, best: bool) 
     if bias.applied.any() and made.part is not None and made.spectra is not None:
         made = replace(made, spectra=made.measured(made.part))
     return Baselines(plain=made if choice.corrects_all else found, best=made)
-
-
-def on_quiet_samples(found: Baseline, quiet: Mask) -> Baseline:
-    """A baseline with the bias fit's free part (T,), if enough."""
-    share = quiet.mean()
-    remark = fact("free-by-the-fit", share=share)
-    if found.motion.choice.is_given and found.missing is not None:
-        # What was given is dropped, and why has to be said.
-        reason = found.missing.values["reason"]
-        remark = caution("free-by-the-fit-instead", share=share, reason=reason)
-    part = FreePart((RunSamples(found.motion.log, quiet),), quiet, (remark,))
-    made = replace(found, part=part, load=free_load(part.pieces), by_fit=True, missing=None)
-    try:
-        return replace(made, spectra=made.measured(part))
-    except ParameterError:  # all of it or nothing is free, or never long enough
-        return found

@@ -18,6 +18,7 @@ from vftcli.observers.spectra import ENOUGH, UNSEEN, FreeError, Spectra, error_b
 from vftcli.observers.table import BEST
 from vftcli.observers.tuning import AutoTuned, Curve, bound_remarks
 from vftcli.robots.friction import HELD, ONE_STOP
+from vftcli.robots.run import Run
 from vftcli.signals.arrays import Array, Mask, handed_over, resample_columns, rms_of_known
 from vftcli.signals.errors import ClockError
 from vftcli.signals.external_torque import ExternalTorque
@@ -31,7 +32,8 @@ STICTION = "stiction at rest"
 def with_band(found: Baseline, reading: FreeReading) -> ExternalTorque:
     """The estimate with its band; itself if nothing is known."""
     estimate, spectra, run = reading.estimate, found.spectra, found.motion.log
-    called, off, tau = None, found.correction, estimate.tau
+    off, tau = found.correction, estimate.tau
+    called, off_sd = None, None if off is None else off.sd
     if off is not None and np.count_nonzero(off.free) >= ENOUGH:
         # Slow loads of the fit, or else the free part's, are no error of a reading.
         if off.load.any():
@@ -50,25 +52,24 @@ def with_band(found: Baseline, reading: FreeReading) -> ExternalTorque:
             moving = np.maximum(error.moving, called.moving)
             resting = np.maximum(error.resting, called.resting)
             error = FreeError(moving, resting, unseen=error.unseen & called.unseen)
-        sd = error_band(error, missed, run.rests, found.correction_sd)
+        sd = error_band(error, missed, run.rests, off_sd)
     elif estimate.name == BEST:
-        sd = stated_band(found, called)
+        sd = stated_band(run, called, off_sd)
     else:
         return estimate
     return replace(estimate, error_sd=handed_over(sd), moving=run.moving)
 
 
-def stated_band(found: Baseline, called: FreeError | None) -> Array:
+def stated_band(run: Run, called: FreeError | None, off_sd: Array | None) -> Array:
     """Band of `best` without spectra, by the robot's own numbers. (T, n) [N·m]
 
     Friction is wrong by a fifth, as is usual; with a fitted bias the band is the rest of it,
     and the readings where its fit sees no contact. In a log of a few samples, or mostly
     gaps, a moving joint has `UNSEEN` of its dry friction.
     """
-    run = found.motion.log
     friction, nothing = run.dry_friction, np.zeros_like(run.dry_friction)
     if called is not None:
-        return error_band(called, nothing, run.rests, found.correction_sd)
+        return error_band(called, nothing, run.rests, off_sd)
     held = FreeError(nothing, (HELD * friction) ** 2, unseen=nothing > 0.0)
     try:
         motion = smooth_motion(run.coarse)

@@ -232,7 +232,7 @@ def torque_level(pieces: Sequence[RunSamples]) -> Array:
         return np.zeros(torque.shape[1])
     moving |= moving.sum(axis=0) < LEAST_MOVING
     within = np.where(moving, torque, np.nan)
-    return np.asarray(np.nanquantile(within, 0.95, axis=0) / Z_95)
+    return np.nanquantile(within, 0.95, axis=0) / Z_95
 
 
 def self_test(free: FreeStatistics, prior: WrenchPrior) -> Array:

@@ -136,12 +136,6 @@ class JointFit(NamedTuple):
         return self.shape.friction(self.fit.values)
 
     @property
-    def at_bound(self) -> tuple[str, ...]:
-        """Friction terms at their bound of zero."""
-        rubs = not self.scores and self.shape.terms
-        return tuple(t for t in BOUNDED if rubs and t not in self.shape.terms)
-
-    @property
     def is_kept(self) -> bool:
         """Whether the profile's friction and rotor predict clearly better."""
         return self.errors[1] < KEPT * self.errors[0]

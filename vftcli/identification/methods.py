@@ -17,6 +17,7 @@ from vftcli.identification.clean_fit import (
     weighted_rms,
 )
 from vftcli.identification.friction_fit import (
+    BOUNDED,
     PLAIN,
     JointFit,
     all_residuals,
@@ -195,7 +196,7 @@ def identified_friction(
 
 def check_friction(j: int, friction: JointFriction, data: Training) -> Iterator[Remark]:
     """A remark if joint j's (from 0) friction pushes at some speed, or falls."""
-    speed = data.fastest(j)
+    speed = abs(data.joined("dq")[:, j]).max()
     torque = steady_torque(friction, np.linspace(0.1 * speed, speed, 10))
     noise = max(robust_sd(log.tau)[j] for log in data.logs)
     # A hundredth of the torque's spread: no friction scatters about zero.
@@ -217,8 +218,9 @@ def check_friction(j: int, friction: JointFriction, data: Training) -> Iterator[
 def fit_remarks(data: Training, fits: Mapping[int, JointFit]) -> Iterator[Remark]:
     """Remarks on fits of friction, and on their motion."""
     for j, fit in fits.items():
-        if fit.at_bound:
-            yield caution("friction-at-bound", on_joints([j]), terms=" and ".join(fit.at_bound))
+        bounded = [term for term in BOUNDED if term not in fit.shape.terms]
+        if bounded and fit.shape.terms and not fit.scores:
+            yield caution("friction-at-bound", on_joints([j]), terms=" and ".join(bounded))
     presliding = fit.presliding  # the same of all joints
     if len(presliding.errors) > 1:
         yield fact(

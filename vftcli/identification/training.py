@@ -275,13 +275,9 @@ class Training(NamedTuple):
         """A signal of all logs, one after the other. (M, n)"""
         return np.concatenate([getattr(log, name) for log in self.logs])
 
-    def fastest(self, j: int) -> float:
-        """Largest speed of joint j (from 0). [rad/s]"""
-        return float(abs(self.joined("dq")[:, j]).max())
-
     def top_speed(self, j: int) -> float:
         """Speed limit of joint j (from 0), else its fastest motion. [rad/s]"""
-        return float(np.fmax(self.robot.limits.qd_max[j], self.fastest(j)))
+        return float(np.fmax(self.robot.limits.qd_max[j], abs(self.joined("dq")[:, j]).max()))
 
 
 def prepare_training(
