@@ -35,7 +35,7 @@ from vftcli.wrench.solvers import wrench_of
 FARTHEST = 3.0  #: A flange this far from its start has run away. [m]
 STARTED = 5e-3  #: A flange has moved from this displacement on. [m]
 TURNED = 0.02  #: A flange has turned from this rotation on. [rad]
-#: Speeds below which the flange counts as at rest when a force comes. [m/s, rad/s]
+#: Speeds below which the flange is at rest. [m/s, rad/s]
 STILL = (0.005, 0.05)
 REST = 1.0  #: A contact begins after this time below the threshold. [s]
 
@@ -110,7 +110,7 @@ class OnlineKalman:
         return self.tau
 
     def wrench(self, q: Array) -> Array:
-        """Flange force pinv(J_Fᵀ) τ̂ of (46), base axes; zero if unknown. (6,) [N, N·m]"""
+        """Base-axes force pinv(J_Fᵀ) τ̂ of (46), or zero. (6,) [N, N·m]"""
         pin, frame = self.pin, self.model.getFrameId("flange")
         J = pin.computeFrameJacobian(self.model, self.data, q, frame, pin.LOCAL_WORLD_ALIGNED)
         (wrench,), (known,) = wrench_of(self.tau[None], J[None])
@@ -300,7 +300,7 @@ class Replayed(NamedTuple):
 
 
 class Latency(NamedTuple):
-    """Times of one application of a force [s]; None where it did not happen."""
+    """Times of one application of a force [s], or None."""
 
     axis: int  #: Index of the axis that passes its threshold first.
     force: float  #: When it passes.

@@ -177,7 +177,7 @@ class Controller:
 
     @property
     def name(self) -> str:
-        """Label: ``traditional``, ``α = 1.6``, or ``α = 6 / 3`` (position / rotation)."""
+        """``traditional``, ``α = 1.6``, or ``α = 6 / 3`` (position / rotation)."""
         if self.kind == "traditional":
             return "traditional"
         distinct = list(dict.fromkeys(f"{a:g}" for a in self.alpha))
@@ -197,7 +197,7 @@ class Controller:
 
     @cached_property
     def recovery(self) -> Array:
-        """2TsB/M + Ts²K/M of the recovery at the speed limit; infinite without one. (6,)"""
+        """2TsB/M + Ts²K/M of the recovery at the speed limit, or ∞. (6,)"""
         p, limit = self.parameters, self.parameters.speed_limit
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
             swell = self.alpha * np.exp(np.where(self.rate > 0, limit * self.rate, 0))

@@ -78,7 +78,7 @@ class Recursion:
     def __init__(
         self, controllers: Sequence[Controller], x: Array | float = 0.0, v: Array | float = 0.0
     ) -> None:
-        """Start at deviations `x` with velocities `v`, (N, 6), (6,) or one number."""
+        """Start at deviations `x` with velocities `v`, (N, 6) or fewer."""
         all_parameters, shape = [c.parameters for c in controllers], (len(controllers), 6)
         self.period = all_parameters[0].period
         self.mass, self.damping, self.stiffness, self.limit = (
@@ -135,7 +135,7 @@ def run(
 def release(
     controllers: Sequence[Controller], x: Array, duration: float, v: Array | float = 0.0
 ) -> AxisMotion:
-    """Motion for `duration` [s] after release at deviation `x`, at rest or with `v`."""
+    """Motion for `duration` [s] after release at `x` with velocity `v`."""
     steps = int(np.ceil(duration / controllers[0].parameters.period - 1e-9))
     return run(controllers, np.zeros((steps, 6)), np.zeros((steps, 6), bool), x, v)
 
@@ -212,7 +212,7 @@ def row_of(
 
 
 def return_time(t: Array, x: Array, drag: Drag, share: float) -> float | None:
-    """Time until an axis stays within `share` of its release; None if it does not. [s]"""
+    """Time until an axis stays within `share` of its release, or None. [s]"""
     after = abs(recovery_of(x, drag))
     if not len(after):
         return None

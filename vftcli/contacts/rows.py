@@ -85,7 +85,7 @@ class ContactLocation(NamedTuple):
         return tuple(sorted(links))
 
     def spread(self, size: float) -> float:
-        """RMS error of the size for the place, by likelihood; 0 at the wrist alone. [N]"""
+        """RMS error of the size for the place, 0 at the wrist alone. [N]"""
         if self.parts == ["wrist"] or not self.is_force:
             return 0.0
         likely = np.exp(-0.5 * np.array([fit.score - self.fits[0].score for fit in self.fits]))
@@ -150,7 +150,7 @@ class ContactMeasurement:
 
     @cached_property
     def locations(self) -> list[ContactLocation]:
-        """Place of every contact, from the disturbance less the model error."""
+        """Place of every contact, by torque beyond the model error."""
         blocks, chain, found = self.log.blocks, self.run.robot.loaded_chain, []
         each = zip(self.found.runs, self.wrenches, self.found.evidence, strict=True)
         for run, wrench, nats in each:

@@ -120,7 +120,7 @@ class Identification(NamedTuple):
 
 
 def score(log: Recording, role: str, profile: Robot, robot: Robot, cutoff: float) -> Trace | None:
-    """Torque of a log: measured, identified robot's, profile's; None at rest."""
+    """Torque of a log: measured, new robot's, profile's; None at rest."""
     motion = prepare(log, profile, cutoff)
     if motion.samples < 2:
         return None
@@ -195,7 +195,7 @@ def joint_remark(trace: Trace, j: int, trained: float) -> Remark:
 
 
 def repeated_share(train: PreparedLog, test: PreparedLog) -> float:
-    """Share of the test's moving samples on the training's path: they are no test."""
+    """Share of the test's moving samples on the training's path."""
     from scipy.spatial import cKDTree
 
     if train.samples == 0 or test.samples == 0:

@@ -95,7 +95,7 @@ class MethodResult(NamedTuple):
 
 
 def friction_method(data: Training, fitted: CleanFit | None = None) -> MethodResult:
-    """Friction, rotor inertia, drive constants if asked; links from the maker."""
+    """Friction, rotor inertia, perhaps drive constants; the maker's links."""
     if not (data.rubs or data.rotor):
         raise IdentificationError(
             f"robot {data.robot.name!r} has its torque behind the gears: without friction the "
@@ -156,7 +156,7 @@ def by_constant(data: Training, j: int, values: Array, sd: Array) -> tuple[Array
 
 
 def rotor_number(j: int, value: float, sd: float, before: float) -> tuple[Number, list[Remark]]:
-    """Rotor inertia of joint j (from 0) [kg·m²], a remark if open or refuted."""
+    """Rotor inertia of joint j (from 0) [kg·m²], perhaps a remark."""
     if refuted := abs(value - before) >= REFUTED * sd:
         value = max(value, 0.0)
     known = value > 0 and sd < DETERMINED * value
@@ -195,7 +195,7 @@ def identified_friction(
 
 
 def check_friction(j: int, friction: JointFriction, data: Training) -> Iterator[Remark]:
-    """A remark if joint j's (from 0) friction pushes at some speed, or falls."""
+    """A remark if joint j's (from 0) friction pushes, or falls."""
     speed = abs(data.joined("dq")[:, j]).max()
     torque = steady_torque(friction, np.linspace(0.1 * speed, speed, 10))
     noise = max(robust_sd(log.tau)[j] for log in data.logs)
@@ -259,7 +259,7 @@ MATTERS = 0.02
 
 
 def whole_arm(data: Training) -> MethodResult:
-    """Base parameters by weighted least squares, robot of nearest physical links."""
+    """Base parameters, and the robot of the nearest physical links."""
     data, fits, remarks = fit_without_contacts(data, strict=False)
     layout, start = initial_columns(data, fits)
     x = nearest_physical_links(stack(layout, data.logs, start), start)

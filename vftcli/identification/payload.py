@@ -349,7 +349,7 @@ def weigh_motion(runs: Sequence[Run], carried: Array) -> tuple[Array, Array, Arr
 
 
 def find_load(logs: Sequence[Recording], robot: Robot, free: Recording | None) -> LoadFit:
-    """The load, from a pair if there is one, else from poses, else from motion."""
+    """The load, from a pair, else from poses, else from motion."""
     bare = robot.with_payload(None)
     if free is not None:
         if (fit := payload_from_pair(logs[0], free, bare)).carried_by(free):

@@ -147,7 +147,7 @@ class PreparedLog:
         return self.columns[key]
 
     def friction(self, j: int, shape: Shape) -> Array:
-        """All terms of a shape for joint j (from 0), one column a term. (M, k)"""
+        """A shape's terms for joint j (from 0), a column each. (M, k)"""
         columns = [self.column(term, j, shape) for term in shape.terms]
         return np.stack(columns, axis=1) if columns else np.zeros((self.samples, 0))
 
@@ -180,7 +180,7 @@ def prepare(recording: Recording, robot: Robot, cutoff: float = CUTOFF) -> Prepa
 
 
 def usable_samples(t: Array, dq: Array, cutoff: float) -> Mask:
-    """Samples with information, by joint: no long stop, no gap beside. (T, n)"""
+    """Samples beside long stops and gaps, by joint. (T, n)"""
     usable = np.ones(dq.shape, bool)
     for j, moves in enumerate(faster(dq, NONZERO).T):
         usable[:, j] = ~covered(intervals(t, ~moves, least=STOP), len(t))
@@ -197,7 +197,7 @@ def load_columns(robot: Robot, q: Array, dq: Array, ddq: Array) -> Array:
 
 
 def apparent_load(log: PreparedLog, residual: Array) -> tuple[float, float]:
-    """Mass that would explain the residual, and the share explained. [kg], [1]"""
+    """Mass [kg] that explains a residual best, and the share explained."""
     signals = ((log.q[s], log.dq[s], log.ddq[s]) for s in log.chunks())
     A = np.concatenate([load_columns(log.robot, *part).reshape(-1, STATIC) for part in signals])
     y = residual.ravel()
@@ -206,7 +206,7 @@ def apparent_load(log: PreparedLog, residual: Array) -> tuple[float, float]:
 
 
 class ParameterColumns(NamedTuple):
-    """Order of all unknowns in a vector: inertial, rotor inertias, friction."""
+    """Order of all unknowns: inertial, rotor inertias, friction."""
 
     chain: Chain  #: The arm's geometry.
     rotor: bool  #: Whether rotor inertias are unknown.
@@ -243,7 +243,7 @@ class ParameterColumns(NamedTuple):
         return (*inertial, *rotors, *terms)
 
     def rows(self, log: PreparedLog, span: slice) -> Array:
-        """Regressor A of a span: A x is every joint's drive torque. (N, n, size)"""
+        """Regressor A of a span: A x is the drive torque. (N, n, size)"""
         q, dq, ddq = log.q[span], log.dq[span], log.ddq[span]
         A = np.zeros((len(q), self.chain.joints, self.size))
         A[:, :, : self.inertial] = torque_regressor(self.chain, q, dq, ddq)
@@ -306,7 +306,7 @@ def prepare_training(
 
 
 def moving_joints(motions: Sequence[PreparedLog]) -> tuple[Mask, Mask]:
-    """Joints that the logs move, and those that they move both ways. (n,), (n,)"""
+    """Joints that the logs move, and move both ways. (n,), (n,)"""
     times = np.zeros((2, motions[0].dq.shape[1]))
     for motion in motions:
         if motion.samples > 1:

@@ -41,7 +41,7 @@ GOALS = {
     "bandwidth": "bandwidth=HZ",
     "false-alarms": "false-alarms=PER_HOUR",
 }
-#: Observer → the parameter that moves only its ω_n, its least and largest value.
+#: Observer → the parameter of its ω_n, its least and largest value.
 KNOBS: dict[type, tuple[str, float, float]] = {
     FilteredDynamicsObserver: ("omega", 1e-3, 1e6),
     MomentumObserver: ("gain", 1e-3, 1e6),
