@@ -98,8 +98,19 @@ def examined(recording: Recording) -> tuple[Recording, dict[str, Any]]:
         (changed("q", 9999, lambda x: x + 0.05, 3), "position-jump", 64, (3,)),
         (glued, "position-jump", 64, None),
         (frozen, "frozen-rows", 374, None),
-        # Three seconds, of J5 not: it does not move.
-        (changed("current", 375, lambda x: 0 * x + x[0]), "frozen-effort", 374, (1, 2, 3, 4, 6)),
+        # Three seconds: of all joints at once nothing else is asked but that the arm moves.
+        (
+            changed("current", 375, lambda x: 0 * x + x[0]),
+            "frozen-effort",
+            374,
+            (1, 2, 3, 4, 5, 6),
+        ),
+        (
+            changed("current", 375, lambda x: 0 * x + x[0], 1, 2, 3, 4, 6),
+            "frozen-effort",
+            374,
+            (1, 2, 3, 4, 6),
+        ),
     ],
 )
 def test_bad_samples_are_cut_out_and_said_once(circle, plant, code, rows, joints):

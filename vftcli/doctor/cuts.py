@@ -4,7 +4,7 @@ Each rule looks at single samples or spans, within the arm's limits. Where two r
 meet the gap is too long for a filter to run across.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -113,7 +113,8 @@ def cut_findings(recording: Recording) -> Iterator[Remark]:
 
 def rules(recording: Recording, robot: Robot) -> Iterator[Bad]:
     """Bad samples of a log, rule by rule."""
-    dq, step, frozen = recording.require("dq"), recording.median_step, frozen_rows(recording)
+    dq, step = recording.require("dq"), recording.median_step
+    frozen = frozen_rows(recording, ("q", "dq", *EFFORTS))
     yield Bad("frozen-rows", frozen[:, None], None, MOST)
     slips = slips_of(recording)
     yield from position_jumps(recording, frozen, slips)
@@ -128,6 +129,8 @@ def rules(recording: Recording, robot: Robot) -> Iterator[Bad]:
     stuck = np.zeros(effort.shape, bool)
     for j, first, last in stuck_stretches(recording, name):
         stuck[first + 1 : last + 1, j] = True
+    for start, stop in runs_of(frozen_rows(recording, (name,))):
+        stuck[start:stop] |= np.ptp(recording.q[start:stop], axis=0).max() > WAY
     # Of one joint a finding is enough; of most that move nothing can be estimated.
     moving = np.count_nonzero(travel_of(recording) > WAY)
     most = stuck.sum(axis=1) > moving / 2
@@ -220,11 +223,11 @@ def zero_bursts(torque: Array, least: Array) -> Mask:
     return found
 
 
-def frozen_rows(recording: Recording) -> Mask:
-    """Rows of a moving arm that repeat all measured values. (T,)"""
+def frozen_rows(recording: Recording, names: Sequence[str]) -> Mask:
+    """Rows of a moving arm that repeat all values of some signals. (T,)"""
     t, dq = recording.t, recording.require("dq")
     same = np.zeros(recording.samples - 1, bool)
-    same[repeated_rows(recording, ("q", "dq", *EFFORTS))] = True
+    same[repeated_rows(recording, names)] = True
     first, last = np.array(runs_of(same), int).reshape(-1, 2).T
     lengths, long = last - first, t[last] - t[first] >= FROZEN
     usual = np.median(lengths[~long]) if not long.all() else 1.0

@@ -190,11 +190,11 @@ def travel_of(recording: Recording) -> Array:
 
 def repeated_rows(recording: Recording, names: Iterable[str]) -> Indices:
     """Rows before those that repeat all of some signals. (K,)"""
+    there = [value for name in names if (value := getattr(recording, name)) is not None]
     # The first column excludes most rows.
-    rows = np.flatnonzero(recording.q[1:, 0] == recording.q[:-1, 0])
-    for name in names:
-        if (value := getattr(recording, name)) is not None:
-            rows = rows[(value[rows + 1] == value[rows]).all(axis=1)]
+    rows = np.flatnonzero(there[0][1:, 0] == there[0][:-1, 0])
+    for value in there:
+        rows = rows[(value[rows + 1] == value[rows]).all(axis=1)]
     return rows
 
 
