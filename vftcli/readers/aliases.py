@@ -185,8 +185,7 @@ class NamedColumns:
     def others(self, stated: Mapping[str, Item]) -> Iterator[Item]:
         """The signals beside those that a text names.
 
-        If it names the positions, only the velocities and an effort that it leaves out,
-        and no signal that two groups could be.
+        If it names the positions, only the velocities and an effort, of one group each.
         """
         if "t" not in stated and (clock := self.find("t")):
             yield clock

@@ -70,8 +70,7 @@ LEAVING_OUT = (
     "leave the signal out: with --columns name the others, as in t=t,q=q_{i},dq=dq_{i}, or skip it "
     "with _:6 in a table without a header"
 )
-#: No robot is sampled ten million times a second, nor for six years: behind the farthest
-#: start nanoseconds in 64 bits count no farther. [s]
+#: No robot is sampled faster, or longer: 64 bits of nanoseconds count no farther. [s]
 SHORTEST_STEP, LONGEST_LOG = 1e-7, 2e8
 #: A clock starts within 285 years of 1970: nanoseconds in 64 bits count no farther. [s]
 FARTHEST_START = 9e9

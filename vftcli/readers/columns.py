@@ -201,8 +201,7 @@ STEPS = (1, 4, 16, 64)
 OPEN = 0.35
 STILL = 0.02  #: Travel below which a joint need not show its velocity. [rad]
 EVEN = 20.0  #: Most medians that all but a twentieth of a clock's steps take.
-#: Misfit of a current to a torque divided by its drive constant, friction left free: of a
-#: UR10e's target current .02 to .09, of its measured current .06 to .6.
+#: Misfit of a current to a torque: of a UR10e's target .02 to .09, of its measured .06 to .6.
 DRIVEN = 0.12
 CLEAR = 1.3  #: How much better than another current it must fit.
 CONSTANTS = (3.0, 400.0)  #: Drive constants of geared joints. [N·m/A]

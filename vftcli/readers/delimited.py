@@ -128,8 +128,7 @@ class TextTable(Table):
 
     def _parsed(self, kinds: Mapping[int, str]) -> Iterator[dict[int, Arrow]]:
         for text in self._pieces():
-            # Most texts parse as they are; mending copies them, so it waits for a
-            # failure, but for doubled blanks, between which cells are seen.
+            # Most texts parse as they are: mending waits for a failure, but for doubled blanks.
             doubled = self.separator == " " and re.search(rb"  |\n | \r?\n", text[:HEAD_BYTES])
             found = None if doubled else self._parse(text, kinds)
             found = found or self._parse(self._mended(text), kinds, mended=True)

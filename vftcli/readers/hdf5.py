@@ -84,8 +84,7 @@ def opened(file: LogFile) -> Iterator[Any]:
 class Hdf5Table(ArrayTable):
     """The datasets of numbers in an open HDF5 file or a group, as columns.
 
-    Images, texts, references, links to other files and what claims more than it stores
-    are left out; nothing is read before it is asked for.
+    Images, texts, links and what claims more than it stores are left out; none is read yet.
     """
 
     def within(self, group: str, *, top: bool = False) -> "Hdf5Table":

@@ -93,8 +93,7 @@ class ReadChoice(Choice):
         tuple[float, float] | None,
         Option("--interval", "A:B", "Use only seconds A to B of the log.", read_interval),
     ] = None
-    #: What the log's effort is, a key of `EFFORT`; "auto" leaves that to who knows the
-    #: robot; None to take what it is called.
+    #: A key of `EFFORT`; "auto" leaves it to who knows the robot; None: as it is called.
     effort: Annotated[
         str | None,
         Option(
@@ -117,8 +116,7 @@ class ReadChoice(Choice):
     arm: Annotated[
         str | None, Option("--arm", "left|right", "Choose one arm of a two-armed log.")
     ] = None
-    #: "dq" to derive the velocities even where the log has some, "none" never to; None to
-    #: do so where it has none and is fast enough.
+    #: "dq" derives velocities in any log, "none" in none; None: where a fast log has none.
     derive: Annotated[
         str | None,
         Option(

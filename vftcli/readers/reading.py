@@ -33,8 +33,7 @@ class LogFormat(NamedTuple):
     recording: str  #: How a user records one.
     takes: str  #: Which signals are read from it.
     pitfalls: str  #: What to look out for.
-    #: Module of this room that reads it, imported when it is needed: by its `read`, or by
-    #: its `episodes`, which gives each one's number and the function that reads it.
+    #: Module of this room with its `read`, or its `episodes`: each one's number and reader.
     module: str
     begins: str = ""  #: Pattern of the content's first bytes, "" for any.
     line: str = ""  #: Pattern of a text's first line, "" for any.
@@ -307,8 +306,7 @@ class Library:
 def labelled(paths: Iterable[str | Path]) -> dict[Path, str]:
     """Give every path, from the root, a label that no other of them has.
 
-    It is the file's name, after as many folders as tell it from every other path:
-    `a/log.csv` and `b/log.csv`. Spellings of one path have one label.
+    The file's name after as many folders as tell it apart; spellings of one path have one.
     """
     # Spellings of one path count once, or no tail of it would be unique.
     parts = {path: path.parts for path in map(absolute, paths)}

@@ -54,8 +54,7 @@ def program_log(table: Table, picks: Picks, choice: ReadChoice) -> RawLog:
 def read_reference(path: Path, columns: str | None = None) -> RawLog:
     """Read a reference file: text, compressed text or Parquet.
 
-    Its stamps [s] are on the clock of the log it belongs to; its signals are `tau_ext`
-    (T, n) [N·m], `wrench` (T, 6) [N, N·m], or both, on the robot.
+    Stamps [s] on its log's clock; `tau_ext` (T, n), `wrench` (T, 6) or both, on the robot.
     """
     table = table_at(path)
     if not columns:

@@ -234,8 +234,7 @@ class LumpedArm:
     def along(self, leaf: TreeJoint) -> tuple[TreeJoint, ...]:
         """The joints of the arm on the way to a leaf; none where nothing turns.
 
-        It ends where several branches part, this one a finger by its mass. A joint within
-        the arm that follows another is refused.
+        It ends where branches part, this one a light finger; none within may follow another.
         """
         path = self.tree.path_to(leaf.child)
         run = self.longest(path)

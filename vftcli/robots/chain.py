@@ -75,8 +75,7 @@ class Chain(Shown):
     ) -> "Chain":
         """The chain of its joints' names, frames and links.
 
-        Frames are poses in the one before, the last the flange's; `more`:
-        `rotor_inertia`, `gravity`.
+        Frames are poses in the one before, the last the flange's; `more` is the other fields.
         """
         rotation, translation = map(np.array, zip(*frames, strict=True))
         return cls(
@@ -166,8 +165,7 @@ def symmetric(entries: Sequence[float] | Array) -> Array:
 def unphysical(mass: float, inertia: Array, *, triangle: bool = True) -> str:
     """Why no body can have this mass and tensor about its centre, or "".
 
-    Principal moments are not negative, none larger than the sum of the other two
-    (`triangle`), but for 1e-6 of the largest: published tables are rounded.
+    Principal moments p ≥ 0, none above the others' sum (`triangle`), but for 1e-6: rounding.
     """
     if not np.isfinite(mass) or mass < 0:
         return f"mass is {mass:g} kg; it must be zero or positive"
@@ -261,8 +259,7 @@ def link_poses(chain: Chain, q: Array) -> Pose:
 def flange_jacobian(chain: Chain, q: Array) -> Array:
     """Jacobian of the flange point in base axes. (T, 6, n)
 
-    Velocity [m], then angular velocity; the transpose takes a force and moment ON the
-    robot to joint torques. Pinocchio's LOCAL_WORLD_ALIGNED.
+    Velocity, then angular velocity: Jᵀ takes a force and moment ON the robot to torques.
     """
     return link_jacobian(link_poses(chain, q), chain.joints)
 

@@ -253,8 +253,7 @@ def steady_torque(friction: JointFriction, dq: Array) -> Array:
 def falling_speed(friction: JointFriction, limit: float) -> float:
     """Lowest speed up to `limit` where a friction falls, or NaN. [rad/s]
 
-    Fading dry friction (Stribeck) and an offset are left out. What then rises with the
-    velocity also opposes every motion.
+    Without fading dry friction and offset: what then rises also opposes every motion.
     """
     if not np.isfinite(limit):
         return float("nan")
@@ -292,8 +291,7 @@ def dry_torques(robot: Robot) -> Array:
 def dry_torque(joint: JointFriction, load: Array | float = 0.0) -> Array:
     """Half the step of a joint's friction where its velocity turns. Like `load`
 
-    It is made of the parameters: at a low speed smoothing, viscosity and fading would
-    count. Presliding friction is held at rest, in full or in part.
+    Made of the parameters; presliding friction is held at rest, in full or in part.
     """
     known = joint.parameters
     coulomb = sum(known.get(key, 0.0) for key in ("coulomb", "stribeck", "presliding"))
@@ -305,8 +303,7 @@ def dry_torque(joint: JointFriction, load: Array | float = 0.0) -> Array:
 #: Deviation of a uniform torque within ±F_c, and of the difference of two: analytic. [F_c]
 ONE_STOP, TWO_STOPS = np.sqrt(1.0 / 3.0), np.sqrt(2.0 / 3.0)
 
-#: The latter where the whole arm rests at one place after one motion, untouched: three runs of
-#: one motion of a UR10e differ by .05 to .5 of F_c, .13 in the mean.
+#: The latter where the whole arm rests untouched: a UR10e's runs have .05 to .5, mean .13.
 REPEATED_STOP = 0.13
 
 #: What an observer reads on a joint at rest, rms: on real UR10e logs .31 to .61 of F_c.
@@ -384,8 +381,7 @@ def in_blocks(limits: Array, blocks: int) -> Array:
 class RunningFriction:
     """The friction of an arm's joints, stretch after stretch of a motion.
 
-    Presliding friction depends on where a joint came from: `centre` is c after the last
-    sample of the joints that have it, None before the first (m,) [rad].
+    `centre` is c after the last sample, of joints with presliding; None at first (m,) [rad].
     """
 
     def __init__(self, friction: Sequence[JointFriction]) -> None:

@@ -37,8 +37,7 @@ class JointFriction(Shown):
     """Friction of one joint: a model's name and its parameters."""
 
     model: str = "none"  #: A name in `vftcli.robots.friction.FRICTION_MODELS`, or "none".
-    #: The model's numbers by key, in SI units of torque, rad and rad/s; beside those of
-    #: the model `presliding` [N·m] and `presliding_length` [rad], both or neither.
+    #: Numbers by key, in SI units; `presliding` and `presliding_length` both or neither.
     parameters: Mapping[str, float] = field(default_factory=dict)
     speeds: tuple[float, ...] = ()  #: Speeds of the model "points", rising. [rad/s]
     torques: tuple[float, ...] = ()  #: Friction at these speeds. [N·m]
@@ -126,8 +125,7 @@ class Robot(Shown):
     ros_state: str = ""
     #: Joints that turn on and on: positions may be logged within a turn.
     endless: tuple[str, ...] = ()
-    #: The joints' friction in a simulator's description, for ``model.friction=model``, or
-    #: empty.
+    #: The joints' friction in a simulator's description, or empty.
     simulated_friction: tuple[JointFriction, ...] = ()
     payload: Payload | None = None  #: The load mounted on the flange, or None.
     #: Further loads by name, for ``--payload NAME``.
@@ -242,8 +240,7 @@ class FlangeSolver:
     def reach(self, rotation: Array, translation: Array, guess: Array) -> tuple[Array, bool]:
         """Joint positions at a pose, from a guess nearby, and whether it is reached.
 
-        A step is Jᵀ(JJᵀ + λ²I)⁻¹e in base axes, cut at the joint limits; where the pose
-        is not reached the joints are those of the last step.
+        A step is Jᵀ(JJᵀ + λ²I)⁻¹e in base axes, cut at the joint limits.
         """
         pin, model, data, frame = self.pin, self.model, self.data, self.frame
         q, error, sizes = guess, np.empty(6), [np.inf, np.inf, np.inf]

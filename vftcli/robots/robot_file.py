@@ -184,8 +184,7 @@ class RobotFile:
     def line(self, table: str, index: int | None, key: str) -> int | None:
         """Line of `key` in `table`, from 1, or of the table's header.
 
-        The keys before any table have the name ""; `index` is the ``[[joints]]`` that a
-        table belongs to, from 0, None outside of them.
+        Keys before any table have the name ""; `index` is its ``[[joints]]``, from 0, or None.
         """
         header = 1 if table == "" else None
         assigns = re.compile(rf"[\"']?{re.escape(key)}[\"']?\s*=")

@@ -268,8 +268,7 @@ def unwound(recording: Recording, robot: Robot) -> Recording:
 def places(logged: Sequence[str], joints: Sequence[str]) -> tuple[int, ...] | None:
     """Places of a robot's joints among a log's, None if the names do not match.
 
-    Names are compared as they are; then without a shared prefix and a trailing `_joint`;
-    then by number, or by the order that is known of a maker's names.
+    By name; without a shared prefix and `_joint`; by number, or by a maker's known order.
     """
     if all(logged.count(name) == 1 for name in joints):
         return tuple(logged.index(name) for name in joints)

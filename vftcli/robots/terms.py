@@ -46,8 +46,7 @@ def check_joints(recording: Recording, robot: Robot) -> None:
 def effort_name(recording: Recording, robot: Robot) -> str:
     """The signal of `EFFORTS` that the drive torque comes from.
 
-    A robot described by currents uses the torques of a log that has nothing else, and
-    the other way round if its file has torque constants.
+    An arm described by currents uses a log's torques where it has no others, and conversely.
     """
     ranked = EFFORTS if robot.torque_source == "current" else (*EFFORTS[1:], EFFORTS[0])
     return next((name for name in ranked if getattr(recording, name) is not None), ranked[0])
@@ -81,8 +80,7 @@ def gravity_torque(robot: Robot, q: Array) -> Array:
 def drive_torque(recording: Recording, robot: Robot) -> Array:
     """Torque of the drives at the joints, friction included. (T, n) [N·m]
 
-    τ = K i where `effort_name` is current, else the measured torque. Torques without
-    gravity get the gravity torque g(q) of the arm with its payload: τ = e + g(q).
+    τ = K i of a current, else the measured torque; without gravity's it is e + g(q).
     """
     check_joints(recording, robot)
     check_effort(recording)

@@ -95,8 +95,7 @@ def normal_equations(A: Array, y: Array, weights: Array) -> NormalEquations:
 def shown_directions(gram: Array, null: float) -> tuple[Array, Array]:
     """Eigenvalues and vectors of a scaled AᵀWA that the data shows. (s,), (k, s)
 
-    Columns are scaled to a unit diagonal, as their units differ. The scale is in the
-    vectors V: V diag(1/values) Vᵀ is the inverse of AᵀWA itself.
+    Columns get a unit diagonal, and V the scale: V diag(1/values) Vᵀ is the inverse of AᵀWA.
     """
     scale = np.sqrt(np.maximum(np.diag(gram), 0.0))
     scale[scale == 0.0] = 1.0

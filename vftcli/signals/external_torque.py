@@ -114,8 +114,7 @@ class ExternalTorque(TimeSeries):
     sd: Array | None = None
     #: RMS error that the estimate is known to have. (n,) [N·m]
     floor: Array | None = None
-    #: One deviation of `tau`, model error and lag included, in single
-    #: precision; None where no free part is known. (T, n) [N·m]
+    #: One SD, model error and lag included; None if no part is free. (T, n) [N·m]
     error_sd: Array | None = None
     #: Whether the joint moves: at rest stiction hides torque. (T, n)
     moving: Mask | None = None

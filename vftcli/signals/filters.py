@@ -95,8 +95,7 @@ def filter_columns(t: Array, x: Array, sections: Array, settling: float | None =
 
 def cascade(sections: Array, x: Array) -> Array:
     """Columns behind all sections, settled on their first input. (T, n)"""
-    # y_t = c·z_{t−1} + b x_t, z_t = F z_{t−1} + g x_t: each section's transposed direct form,
-    # with the output of those before it as its input.
+    # y_t = c·z_{t−1} + b x_t, z_t = F z_{t−1} + g x_t: transposed direct forms in series.
     F, g, c, b = np.zeros((0, 0)), np.zeros(0), np.zeros(0), 1.0
     for b0, b1, b2, _, a1, a2 in sections.tolist():
         own, into = np.array([[-a1, 1.0], [-a2, 0.0]]), np.array([b1 - a1 * b0, b2 - a2 * b0])

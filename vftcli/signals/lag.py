@@ -30,8 +30,7 @@ BLOCK = 8192
 def lags_of_each(late: Sequence[Array], early: Array, step: float) -> Array:
     """Delay of each column at which it fits best, NaN where nothing fits. (m, n)
 
-    Maximises the correlation with `early` over common known samples, for delays from
-    −`LEAD` to `LONGEST`, refined by a parabola; an uneven clock's in median steps. [s]
+    Best correlation with `early` from −`LEAD` to `LONGEST`, refined by a parabola. [s]
     """
     samples = len(early)
     first = -min(round(LEAD / step), samples // 4)
@@ -70,8 +69,7 @@ def fits(late: Array, early: Array, known: Mask, at: Indices) -> Array:
 def sliding(later: Array, earlier: Array, at: Indices) -> Array:
     """Sum over time of `later` (m, T), so many samples on, times `earlier`. (m, L)
 
-    Each block of `earlier` meets the part of `later` that its successive lags reach, and
-    their cross-spectra are added up before one transform back (overlap-save).
+    Blocks of `earlier` meet what their lags reach; spectra are added up (overlap-save).
     """
     samples, first, reach = earlier.shape[1], int(at[0]), len(at) - 1
     # A block no longer than the log, and no shorter than what its lags reach besides.

@@ -38,8 +38,7 @@ def inverse(pose: Pose) -> Pose:
 def adjoint(pose: Pose) -> Array:
     """The matrix that takes a wrench in S to F, for the pose of S in F. (..., 6, 6)
 
-    With R the orientation and p the origin of S in F it is [[R, 0], [[p]×R, R]],
-    Pinocchio's ``SE3(R, p).act(Force)``.
+    R, p of S in F: [[R, 0], [[p]×R, R]], Pinocchio's ``SE3(R, p).act(Force)``.
     """
     R, p = pose.rotation, pose.translation
     X = np.zeros((*R.shape[:-2], 6, 6))

@@ -324,8 +324,7 @@ def pieces(values: NDArray[Any]) -> Iterator[NDArray[Any]]:
 def same_run(one: Recording, other: Recording) -> bool:
     """Whether two recordings were read from equal bytes.
 
-    A span of a recording is the same run as the whole. Two recordings of one file are two
-    runs if its clock tells them apart, or if they are two of its parts.
+    A span is the same run as the whole; of one file clock and part tell two runs apart.
     """
     if one is other:
         return True

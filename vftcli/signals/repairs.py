@@ -19,9 +19,8 @@ from vftcli.signals.filters import low_pass
 from vftcli.signals.recording import EFFORTS, Recording
 from vftcli.signals.remarks import caution, fact, on_joints
 
-#: Cutoff of the derivative, twice. [Hz] Positions of UR10e logs, rounded to 1e-4 rad at
-#: 100 Hz, give velocities off by .0024 to .0031 rad/s rms so, and by .10 to .44 as plain
-#: differences; 5 and 20 Hz differ little.
+#: Cutoff of the derivative, twice. [Hz] UR10e positions, to 1e-4 rad at 100 Hz, give speeds
+#: off by .003 rad/s rms so, by .10 to .44 as plain differences; 5 and 20 Hz differ little.
 CUTOFF = 12.0
 OF_NYQUIST = 0.4  #: The same in a slow log, as a share of half its rate.
 #: Cutoff times length of the pushes below which the filter blunts them: 40 ms at 12 Hz.
@@ -60,8 +59,7 @@ def derived_velocity(recording: Recording) -> tuple[Array, float]:
 NEAR = 2
 #: Quantile of usual bends, 2.7 sd of white noise: 1 % of bad samples make 3 % of bad bends.
 USUAL = 0.97
-#: A sample this far off is alone: 16 sd of white noise. Of 36 sound
-#: logs a UR10e's have one, at most 11 in 1896; 24 have none.
+#: A sample this far off is alone: 16 sd of white noise. 24 of 36 sound logs have none.
 FAR = 6.0
 #: And beyond this share of what a velocity or effort spans without its outer hundredths.
 SPREAD = 0.03
@@ -81,8 +79,7 @@ FINEST = 1e-6
 def without_isolated(recording: Recording) -> Recording:
     """A recording without samples that stand alone, said; itself where there are none.
 
-    One a little too far off is drawn to the limit, one twice as far off to its
-    neighbours' median, linearly in between.
+    A little too far off it is drawn to the limit, twice as far to its neighbours' median.
     """
     there = [name for name in ("q", "dq", *EFFORTS) if getattr(recording, name) is not None]
     changed = np.zeros(recording.q.shape, bool)

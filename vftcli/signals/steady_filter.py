@@ -18,8 +18,7 @@ import numpy as np
 
 from vftcli.signals.arrays import Array, Indices, empty_series
 
-#: Samples handled at a time, to bound memory; blocks of a log that begin at multiples of it
-#: give the whole log's numbers to the last bit.
+#: Samples at a time: blocks that begin at its multiples give the whole log's numbers.
 PIECE = 1 << 14
 FORGOTTEN = 1e-20  #: Share of a state that counts as nothing.
 #: Samples in a block, a power of two: more work, fewer blocks.
@@ -139,8 +138,7 @@ def spans(samples: int, *, begins: bool) -> list[slice]:
 def recursion(F: Array, x: Array, start: Array) -> Array:
     """States y_t = F_t y_{t−1} + x_t from y_{−1} = `start` (m, n). (m, T, n)
 
-    F (m, m, T, n) holds the transitions of an m-state filter for each of n joints, x
-    (m, T, n) its input.
+    F (m, m, T, n) are the transitions of m states for each of n joints, x (m, T, n) inputs.
     """
     y = np.empty((len(x), x.shape[2], x.shape[1])).swapaxes(1, 2)
     for span in spans(x.shape[1], begins=False):

@@ -36,8 +36,7 @@ ABSOLUTE = {"com": 1.0, "torque_offset": 1e4}
 class Servo:
     """τ = τ_ff + M(q) (ω² (q_d − q) + 2ζω (q̇_d − q̇)), within the drives' limits.
 
-    With the nominal inertia as gain one number sets the stiffness, and all modes have one
-    bandwidth; gains joint by joint would leave a redundant arm a mode that chatters.
+    One number sets the stiffness, and the inertia as gain gives all modes one bandwidth.
     """
 
     def __init__(self, spec: ServoSpec, robot: Robot, step: float) -> None:
@@ -99,8 +98,7 @@ class TrueArm(NamedTuple):
 class Arm:
     """An arm under its servo, touched by its scenario's contacts.
 
-    A controller in the loop calls `command` and reads `q`, `v` and `mean_torque`. `made`
-    of the run's `steps` are done.
+    A controller in the loop calls `command` and reads `q`, `v`, `mean_torque`.
     """
 
     def __init__(self, scenario: Scenario, seed: int, start: Reference, duration: float) -> None:
@@ -127,9 +125,8 @@ class Arm:
         self.steps, self.made = int(np.ceil(duration / h - 1e-9)), 0
         contacts, lasts = scenario.contacts, self.steps * h
         self.touching = Touching(contacts, self.robot.chain, lasts, self.seeds["contacts"])
-        #: Course of the run, one row an inner step; row k covers k·step to (k+1)·step,
-        #: one more is the state after the last. State and reference are at a step's
-        #: start, all else holds over it.
+        #: Row k covers k·step to (k+1)·step, one more is the state after the last. State and
+        #: reference are at a step's start, all else holds over it.
         rows = self.steps + 1
         self.history = {name: np.zeros((rows, len(q))) for name in KEPT}
         #: Wrench of each contact at the middle of the step. (N, C, 6) [N, N·m]
@@ -159,8 +156,7 @@ class Arm:
     ) -> None:
         """Make one inner step to commanded positions. (n,) [rad]
 
-        Velocities and accelerations not given are zero. Feed-forward torque (n,) [N·m] not
-        given is the servo's own, with positions brought to the joint limits.
+        Velocities and accelerations default to zero, feed-forward torque to the servo's own.
         """
         rest = np.zeros_like(q_d)
         dq_d, ddq_d = rest if dq_d is None else dq_d, rest if ddq_d is None else ddq_d

@@ -32,13 +32,11 @@ SHAPES = (
 #: What does not grow with the speed for ever.
 DRY = ("coulomb", "load_coulomb", "presliding", "amplitude")
 WET = ("viscous", "quadratic", "logarithmic", "bend_slopes")  #: What does: the film of oil.
-#: Below it the dry friction of a soft joint fades: on a UR10e a·s
-#: beside a sign smoothed over 3 mrad/s leaves least. [rad/s]
+#: Below it a soft joint's dry friction fades: on a UR10e 3 mrad/s leave least. [rad/s]
 CREEP = 3e-3
 LARGEST_STEP = 1e-3  #: Largest inner step. [s]
 GUESSES = 12  #: Active-set guesses before the slower way that always converges takes over.
-#: Torque of the contacts (n,) [N·m] at the middle of a step, from the Pinocchio model and
-#: data (joint Jacobians and placements are current) and the velocities.
+#: Torque of the contacts (n,) [N·m] amid a step, of current Pinocchio data and velocities.
 External = Callable[[Any, Any, Array], Array]
 
 

@@ -44,8 +44,7 @@ class Measured(NamedTuple):
     stamp: Array  #: Time stamps, jittering. (M,) [s]
     #: Sample in each row of the log; lost ones are missing, repeated ones come twice.
     rows: Indices
-    #: Field of a recording → its signal: the sensors' and the flange's own reports, and
-    #: the controller's targets and estimate of contact. (M, n) each
+    #: Field of a recording → its signal, the controller's targets and estimate too. (M, n) each
     signals: dict[str, Array]
 
 

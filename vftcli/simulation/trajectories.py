@@ -162,8 +162,7 @@ class HoldSpec(Spec, kind="hold"):
 class OffsetsSpec(Spec, kind="offsets"):
     """Straight lines of the flange between stated points, at constant orientation."""
 
-    #: Rows (start time, end time, x, y, z), in base axes: the displacement from the start
-    #: by the end time, then rest. [s, m]
+    #: Rows (start, end, x, y, z), base axes: displaced from the start by the end. [s, m]
     moves: tuple[tuple[float, float, float, float, float], ...]
     length: float  #: Length of the whole motion. [s]
     start: tuple[float, ...] = ()  #: Joint positions at the offset (0, 0, 0). (n,) [rad]
@@ -189,8 +188,7 @@ class OffsetsSpec(Spec, kind="offsets"):
 class JointMovesSpec(Spec, kind="joint-moves"):
     """Straight moves in joint space between stated displacements from the start."""
 
-    #: Rows (start time, end time, one displacement a joint): that from the start by the
-    #: end time, then rest. [s, rad]
+    #: Rows (start, end, one displacement a joint), reached by the end, then rest. [s, rad]
     moves: tuple[tuple[float, ...], ...]
     length: float  #: Length of the whole motion. [s]
     start: tuple[float, ...] = ()  #: Joint positions at no displacement. (n,) [rad]

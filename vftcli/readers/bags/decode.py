@@ -228,8 +228,7 @@ def _paths_by_name(text: str) -> dict[str, Names]:
 class Kind(NamedTuple):
     """One message type."""
 
-    #: Signal → dotted paths to try in turn; a path of six numbers means force and torque
-    #: below it. `effort` is decided later, by the joints' names.
+    #: Signal → dotted paths to try, a wrench's above its six numbers; `effort` is settled later.
     signals: Mapping[str, Names]
     names: str = ""  #: Path of the joints' names.
     frame: str = ""  #: Path of the frame's name.

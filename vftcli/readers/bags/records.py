@@ -209,8 +209,7 @@ TABLES = {
 }
 
 STEPS = 10_000
-#: Most steps of SQLite for a file, some ten a row and topic, a row having a few bytes or more:
-#: pages that hold one another have rows without end.
+#: Most steps of SQLite for a file, some ten a row: looping pages have rows without end.
 SPARE_STEPS, STEPS_PER_BYTE = 20_000_000, 200
 
 

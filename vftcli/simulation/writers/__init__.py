@@ -27,11 +27,9 @@ from vftcli.simulation.sensing import drive_constants
 from vftcli.simulation.writers.rosbag2 import ROBOT_STATE, write_rosbag2
 from vftcli.wrench.solvers import LEAST_SIGMA, wrench_of
 
-#: Column → its signal or constants, one a column; "-NAME" is minus the signal, "next
-#: NAME" the next row, the last repeated: commands run one cycle later.
+#: Column → its signal ("-NAME" minus it, "next NAME" a row later: commands), or constants.
 Columns = Mapping[str, str | tuple[float, ...]]
-#: The official client's default record_configuration.xml. Constants are of what is not
-#: simulated: robot mode RUNNING, joint mode RUNNING, safety NORMAL.
+#: The official client's default recipe; constants: robot and joint RUNNING, safety NORMAL.
 CLIENT: Columns = {
     "timestamp": "time",
     "target_q": "target_q",
