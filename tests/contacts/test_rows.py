@@ -122,7 +122,7 @@ def test_a_row_on_a_link_has_its_moment_about_the_flange():
 def test_a_size_is_as_sure_as_its_place():
     def fit(link: int, size: float, score: float, share: float = 0.5) -> PointFit:
         force = np.array([size, 0.0, 0.0])
-        return PointFit(link=link, share=share, misfit=0.0, score=score, force=force, band=1.0)
+        return PointFit(link, share, misfit=0.0, score=score, size=size, force=force, band=1.0)
 
     alike = ContactLocation([fit(5, 40.0, 1.0), fit(4, 60.0, 1.0)], 6, ())
     assert alike.spread(40.0) == 0.0  # both on the wrist, whose wrench holds them
@@ -140,7 +140,7 @@ def test_a_size_is_as_sure_as_its_place():
 def test_where_no_point_force_fits_the_links_are_those_that_a_moment_may_have_touched():
     """A χ² beyond 20 is no point force: its size at other places says nothing either."""
     force = np.array([60.0, 0.0, 0.0])
-    odd = PointFit(link=3, share=0.5, misfit=21.0, score=30.0, force=force, band=1.0)
+    odd = PointFit(3, 0.5, misfit=21.0, score=30.0, size=60.0, force=force, band=1.0)
     pushed = ContactLocation([odd], 6, (0, 6))
     assert (pushed.links, pushed.on_wrist, pushed.spread(40.0)) == ((0, 6), True, 0.0)
     assert pushed.sizes(40.0, 5.0) == (35.0, 45.0)

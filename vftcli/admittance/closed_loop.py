@@ -185,12 +185,6 @@ class Loop:
         else:  # out of reach or too fast for a joint: wait at rest, as at a wall
             law.x, law.v, law.turn = x, 0.0 * v, turn
 
-    @property
-    def reference(self) -> Reference:
-        """The command that the servo holds until the next one, one row."""
-        speed = (self.q_command - self.q_before) / self.controller.parameters.period
-        return Reference(self.q_command[None], speed[None], np.zeros_like(speed)[None])
-
 
 #: No built-in closed-loop scenario touches the arm in this span. [s]
 UNLOADED = (0.5, 3.0)
@@ -243,7 +237,9 @@ def run_closed_loop(
             loop.sample()
         if k % every_control == 0:
             log.append(loop.act(zero))
-            reference = loop.reference
+            # The servo holds it until the next one.
+            speed = (loop.q_command - loop.q_before) / period
+            reference = Reference(loop.q_command[None], speed[None], np.zeros_like(speed)[None])
             forward = arm.servo.feed_forward(reference)[0]
             x = loop.law.x[0]
             near = np.isfinite(x).all() and np.linalg.norm(x[:3]) <= FARTHEST

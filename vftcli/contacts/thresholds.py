@@ -56,26 +56,10 @@ class Tail(NamedTuple):
 
     maxima: Array  #: The block maxima, largest first. (B,)
     size: int  #: Number k of them beyond `start`.
-
-    @property
-    def start(self) -> float:
-        """u: where the tail begins. [the signal's unit]"""
-        return float(self.maxima[self.size])
-
-    @property
-    def excess(self) -> float:
-        """e: mean distance from `start` of the maxima beyond it. [the signal's unit]"""
-        return float(self.maxima[: self.size].mean()) - self.start
-
-    @property
-    def hours(self) -> float:
-        """Length of the known blocks. [h]"""
-        return len(self.maxima) * BLOCK / 3600.0
-
-    @property
-    def rate(self) -> float:
-        """λ: how often the signal passes `start`. [1/h]"""
-        return self.size / self.hours
+    start: float  #: u: where the tail begins. [the signal's unit]
+    excess: float  #: e: mean distance of those beyond. [the signal's unit]
+    hours: float  #: Length of the known blocks. [h]
+    rate: float  #: λ: how often the signal passes `start`. [1/h]
 
     def threshold(self, rate: float) -> tuple[float, tuple[float, float]]:
         """The level passed at a rate [1/h], u + e ln(λ/rate), and the ends of its 95 %.
@@ -105,7 +89,12 @@ def tail_of(maxima: Array) -> Tail | None:
     """The tail of block maxima (B,), None of fewer than five."""
     hours = len(maxima) * BLOCK / 3600.0
     count = min(max(LEAST_READINGS, round(AN_HOUR * hours)), len(maxima) // SHARE)
-    return Tail(np.sort(maxima)[::-1], count) if count else None
+    if not count:
+        return None
+    ordered = np.sort(maxima)[::-1]
+    start = float(ordered[count])
+    excess = float(ordered[:count].mean()) - start
+    return Tail(ordered, count, start, excess, hours, count / hours)
 
 
 #: So many false alarms show a rate; fewer extrapolate it.

@@ -78,13 +78,9 @@ class PointFit(NamedTuple):
     share: float  #: Share along the link, from its joint (0) to the next (1).
     misfit: float  #: χ² of the torque that is left.
     score: float  #: χ² and what the size of the force costs.
+    size: float  #: |F|. [N]
     force: Array  #: The force in base axes. (3,) [N]
     band: float  #: Half width of the 95 % band of its size. [N]
-
-    @property
-    def size(self) -> float:
-        """|F|. [N]"""
-        return float(np.linalg.norm(self.force))
 
 
 def point_fits(chain: Chain, q: Array, torque: Array, sd: Array) -> list[PointFit]:
@@ -106,11 +102,12 @@ def point_fits(chain: Chain, q: Array, torque: Array, sd: Array) -> list[PointFi
     forces = (covariance @ (A.swapaxes(1, 2) @ y)[..., None])[..., 0]
     misfit = np.sum((y - (A @ forces[..., None])[..., 0]) ** 2, axis=1)
     score = misfit + np.sum(forces**2, axis=1) / FORCE_PRIOR**2
-    u = forces / np.maximum(np.linalg.norm(forces, axis=1), 1e-12)[:, None]
+    size = np.linalg.norm(forces, axis=1)
+    u = forces / np.maximum(size, 1e-12)[:, None]
     bands = 1.96 * np.sqrt(np.einsum("pi,pij,pj->p", u, covariance, u))
     least = score.min() + ALIKE
     order = score.argsort(kind="stable")[: np.count_nonzero(score <= least)]
-    columns = (x[order].tolist() for x in (links, along, misfit, score))
+    columns = (x[order].tolist() for x in (links, along, misfit, score, size))
     return [PointFit(*each) for each in zip(*columns, forces[order], bands[order], strict=True)]
 
 

@@ -82,16 +82,8 @@ class Curve(NamedTuple):
 
     omega_n: Array  #: Natural frequencies tried. (G,) [rad/s]
     rmse: Array  #: Expected error. (G, n) [N·m]
-
-    @property
-    def best(self) -> Array:
-        """The best natural frequency. (n,) [rad/s]"""
-        return np.asarray(self.omega_n[self.rmse.argmin(axis=0)])
-
-    @property
-    def least(self) -> Array:
-        """The expected error at the best. (n,) [N·m]"""
-        return np.asarray(self.rmse.min(axis=0))
+    best: Array  #: The best natural frequency. (n,) [rad/s]
+    least: Array  #: The expected error at the best. (n,) [N·m]
 
 
 def natural_frequencies(step: float, slowest: float = SLOWEST) -> Array:
@@ -107,7 +99,8 @@ def error_curve(kind: Kind, spectra: Spectra, slowest: float = SLOWEST) -> Curve
     response = kind(omega_n).frequency_response(spectra.frequency, spectra.step, len(omega_n))
     missed = (abs(1.0 - response) ** 2).T @ spectra.external
     passed = (abs(response) ** 2).T @ spectra.noise
-    return Curve(omega_n, np.sqrt((missed + passed) * spectra.width))
+    rmse = np.sqrt((missed + passed) * spectra.width)
+    return Curve(omega_n, rmse, omega_n[rmse.argmin(axis=0)], rmse.min(axis=0))
 
 
 def bound_remarks(name: str, rate: Array, grid: Array) -> tuple[Remark, ...]:
