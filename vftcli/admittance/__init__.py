@@ -120,7 +120,7 @@ class ControlChoice(Choice):
         return np.array(start, float)
 
     def controllers(self, robot: "Robot") -> "tuple[Controller, ...]":
-        """The compared controllers by the robot's parameters, then those that are set."""
+        """The compared controllers, by the robot's parameters and the set ones."""
         from vftcli.admittance.law import controllers, from_table
 
         parameters = from_table(robot.admittance, robot.name, self.settings)

@@ -267,7 +267,7 @@ class JointPath(NamedTuple):
 
     #: Positions; out of reach it waits at the last one. (T, N, n) [rad]
     q: Array
-    reached: Mask  #: Whether the flange pose is reached inside the joint limits. (T, N)
+    reached: Mask  #: Whether the pose is reached inside the limits. (T, N)
     #: Largest joint speed as a share of its limit, NaN without one. (N,)
     speed: Array
 

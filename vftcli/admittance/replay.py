@@ -67,7 +67,7 @@ class Replay:
     drags: tuple[Drag, ...]  #: The drags of every axis.
     #: Logged flange less X_d, None for a release. (T, 6) [m, rad]
     logged: Array | None = None
-    force_remarks: tuple[Remark, ...] = ()  #: Remarks on the force and on stability.
+    force_remarks: tuple[Remark, ...] = ()  #: Of the force and of stability.
 
     @property
     def parameters(self) -> Admittance:

@@ -193,7 +193,7 @@ def find_baselines(motion: FreeMotion, choice: RefinementChoice, *, best: bool) 
             remark = caution("free-by-the-fit-instead", share=share, reason=reason)
         part = FreePart((RunSamples(motion.log, bias.free),), bias.free, (remark,))
         made = replace(found, part=part, load=free_load(part.pieces), by_fit=True, missing=None)
-        with suppress(ParameterError):  # all of it or nothing is free, or never long enough
+        with suppress(ParameterError):  # never free for long enough
             found = replace(made, spectra=made.measured(part))
     evened = () if motion.log is as_read else motion.log.recording.source.remarks[-1:]
     fitted = bias if bias.fitted else None

@@ -125,7 +125,7 @@ class ModelError(NamedTuple):
         return np.concatenate([self.inertial, mine.ravel()])
 
     def torque(self, run: Run, motion: SmoothMotion) -> Array:
-        """Torque A δx that a model with this error lacks, by coarse motion. (T, n) [N·m]"""
+        """Torque A δx that a model with this error lacks. (T, n) [N·m]"""
         chain = run.robot.loaded_chain
         wrong = with_parameters(
             chain, chain_parameters(chain) + self.inertial, chain.rotor_inertia + self.rotor

@@ -123,7 +123,7 @@ def friction_share(dq: Array, tau: Array) -> Array:
 
 
 def limits_remark(name: str, causes: Mapping[str, Array], stuck: Mask) -> Remark:
-    """Each joint's largest cause of error, stiction if `stuck` (n,), and its part."""
+    """Each joint's largest cause of error, and its part."""
     felt = {**causes, STICTION: np.where(stuck, causes[STICTION], 0.0)}
     sizes = np.array([*felt.values()])
     named = [list(felt)[k] for k in sizes.argmax(axis=0)]

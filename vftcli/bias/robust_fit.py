@@ -217,7 +217,7 @@ FREE_PASSES = 3  #: Passes of the second fit.
 CONTACT = 5.0  #: Scales of a joint's residual in contact, …
 LASTS = 0.08  #: … for at least this time. [s]
 GROWN = 0.25  #: Time of a contact before and after. [s]
-FEWEST = 30  #: Fewer free samples: no contact is named; fewer in all: nothing is fitted.
+FEWEST = 30  #: Fewest free samples, and samples, of a fit.
 
 
 @dataclass(frozen=True, kw_only=True)

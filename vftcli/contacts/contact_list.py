@@ -251,7 +251,7 @@ class ContactList(Shown):
     free_seconds: float = 0.0  #: Length of the free motion. [s]
     #: Contacts listed in the log's own free part, None where it has none.
     false_on_free: int | None = None
-    threshold: float | None = None  #: Least evidence of a contact, None without. [nats]
+    threshold: float | None = None  #: Least evidence of a contact. [nats]
     #: The smallest force that this log can tell, None without a wrench. [N]
     smallest_force: float | None = None
     #: The largest torque if nothing can be listed, else None.

@@ -255,7 +255,7 @@ RINGING = 0.05  #: Share of the speed before that ringing may leave at rest.
 
 
 def is_load(recording: Recording, contacts: Sequence[Contact]) -> bool:
-    """Whether contacts of one force fill over half of the time since first motion."""
+    """Whether contacts of one force fill half of the time in motion."""
     moving = np.any(faster(recording.require("dq"), REST), axis=1)
     t = recording.t
     first = t[np.argmax(moving)]

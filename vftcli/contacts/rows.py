@@ -39,13 +39,13 @@ BESIDE = 0.1  #: A cut this near to a row may have removed a part of it. [s]
 BENT_SHORT = 0.4
 #: Least correlation time of a contact, as a share of its length.
 OWN_TIME = 0.5
-#: A contact shorter than this [s] loses its peak below such a rate [Hz]: a tap lasts 50 ms.
+#: A contact shorter than this [s] loses its peak below such a rate [Hz].
 SHORT, SLOW = 0.25, 95.0
 #: Without known free motion a push may act for so long beyond its blocks: else its ends would
 #: be model error, and it would look smaller. On nine simulated arms 14 % of the sizes were
 #: below their bands, so 2 %. [s]
 TAIL = 0.5
-#: A contact's place comes from blocks above this share of its peak, so near it [s].
+#: A contact's place comes from blocks above this share of its peak [s].
 CORE, CORE_TIME = 0.5, 0.1
 #: SD of the moment about the point of a point force. [N·m]
 POINT_MOMENT = 1e-3

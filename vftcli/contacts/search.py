@@ -44,7 +44,7 @@ from vftcli.wrench.model_error import (
 )
 from vftcli.wrench.smoother import BlockLog, BlockSpan, WrenchPrior
 
-#: A torque beyond the threshold for longer beside a contact is part of it, no lag. [s]
+#: Longer beyond the threshold beside a contact is part of it, no lag. [s]
 LASTING = 1.0
 #: A push as it may be: SD of force and moment at the flange. [N, N·m]
 PUSH = np.repeat([30.0, 3.0], 3)
@@ -107,7 +107,7 @@ class Candidates(NamedTuple):
 
 
 def search(run: Run, noise: TorqueNoise, level: Array, seconds: float) -> Candidates:
-    """Possible contacts along a log in blocks [s], by free motion's noise and level."""
+    """Possible contacts along a log in blocks [s], by free motion."""
     blocks = disturbance_blocks(run.terms, run.q, seconds)
     options = places(run.robot.loaded_chain, blocks.q)
     flange, J = options[0].jacobian, flange_jacobian(run.robot.loaded_chain, blocks.q)

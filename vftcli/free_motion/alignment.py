@@ -125,7 +125,7 @@ def why_slower(recording: Recording, free: Recording, rate: float) -> str:
 
 
 def pace(recording: Recording) -> float | None:
-    """Distance by velocities over that by positions, 1 on a right clock; or None."""
+    """Distance by velocities over that by positions, or None."""
     if recording.dq is None or "dq" in recording.source.derived:
         return None
     t = recording.t

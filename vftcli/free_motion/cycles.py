@@ -149,7 +149,7 @@ def returned(t: Array, q: Array, seconds: float, every: int = 1) -> float:
 
 
 def refined_period(t: Array, q: Array, period: float) -> float:
-    """A period refined on the log's own clock by Gauss–Newton on q(t + mP) = q(t). [s]"""
+    """A period refined by Gauss–Newton on q(t + mP) = q(t). [s]"""
     both, n = np.hstack([q, np.gradient(q, t, axis=0)]), q.shape[1]
     last = max(1, int((t[-1] - t[0]) / period - LEAST_REPEATED))
     several = np.unique(np.linspace(1, last, min(last, MULTIPLES)).astype(int))

@@ -289,7 +289,7 @@ def difference(pair: PairedRuns, name: str, cutoff: float | None) -> Difference:
 
 
 def most_certain(made: Iterable[Difference]) -> tuple[Difference, list[Remark]]:
-    """The difference of least expected error of trusted joints in motion; all floors."""
+    """The difference of least expected error in motion; all floors."""
     steps = iter(made)
     chosen = next(steps)
     lowest, least = chosen.error.floor_moving, 1.0

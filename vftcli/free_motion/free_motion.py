@@ -139,7 +139,7 @@ class FreeMotion(Shown):
 
     @cached_property
     def free_cycles(self) -> FreeCycles:
-        """Free cycles: those you name or that lie inside a free span, else those found."""
+        """Free cycles: those named or inside a free span, else those found."""
         cycles, whole = self.cycles, self.cycles.whole
         for number in self.choice.cycles:
             if not 1 <= number <= whole:
@@ -248,7 +248,7 @@ class FreeLoad:
         return handed_over(load_regressor(run.robot.chain, run.q) @ self.weights)
 
     def wrench(self, chain: Chain, q: Array) -> tuple[Array, Array]:
-        """Base-axes wrench of its weight at q (N, n) about the flange; covariance. (N, 6)"""
+        """Base-axes wrench of its weight at q about the flange; covariance. (N, 6)"""
         each = load_wrench(chain, q)
         spread = each * np.concatenate([[self.sd], self.moment_sd])
         return each @ self.weights, spread @ spread.swapaxes(1, 2)

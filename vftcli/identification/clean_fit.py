@@ -123,7 +123,7 @@ def fitted_dry_friction(log: PreparedLog, fits: Mapping[int, JointFit]) -> Array
 
 
 def links_explain(data: Training, fits: Mapping[int, JointFit]) -> Array:
-    """Rest of the profile's links over free ones', also unphysical, heavy joints. (h,)"""
+    """Rest of the profile's links over free ones', heavy joints. (h,)"""
     joints = range(data.robot.joints)
     shapes = tuple(fits[j].shape if j in fits else Shape(()) for j in joints)
     layout = ParameterColumns(data.robot.chain, data.rotor, shapes)

@@ -66,7 +66,7 @@ class PreslidingScore(NamedTuple):
     """The presliding length of an arm."""
 
     length: float  #: The chosen one, 0 for none. [rad]
-    #: Cross-validated error of every length over that of none, rms over the joints.
+    #: Every length's cross-validated error over that of none, rms.
     errors: dict[float, float]
 
 
@@ -266,7 +266,7 @@ def choose_shape(data: JointData, length: float = 0.0) -> tuple[Shape, dict[Shap
 
 
 def candidate_shapes(best: Shape, data: JointData, speed: float = 0.0) -> list[Shape]:
-    """A joint's competing shapes up to its highest speed [rad/s], else as `best`."""
+    """A joint's competing shapes up to a speed [rad/s], else as `best`."""
     shapes, line = list[Shape](), bent(speed)
     points = [(*line.terms, *more) for more in BESIDE_POINTS] if line else []
     for terms in (*CANDIDATES, *points):

@@ -182,7 +182,7 @@ def group_parameters(layout: ParameterColumns) -> Grouping:
 
 
 def base_parameters(triangles: Triangles, start: Array) -> pl.DataFrame:
-    """Base parameters by weighted least squares, infinite sd without data; `BASE`."""
+    """Base parameters by weighted least squares, as rows of `BASE`."""
     layout = triangles.layout
     grouping, (R, z) = group_parameters(layout), triangles.joined()
     R, before = R[:, grouping.independent], grouping.values(start)

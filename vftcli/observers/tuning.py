@@ -203,7 +203,7 @@ def parse_goal(
 def match_observers(
     observers: Sequence[Observer], goal: Goal, step: float, joints: int
 ) -> tuple[tuple[Observer, ...], tuple[Remark, ...]]:
-    """Observers with one delay to a slow ramp, or −3 dB bandwidth, with remarks."""
+    """Observers with one delay to a slow ramp, or one bandwidth; remarks."""
     tuned = tuple(tune(observer, goal, step, joints) for observer in observers)
     remarks: tuple[Remark, ...] = (fact("bandwidth-matched", bandwidth_Hz=goal.value),)
     if goal.name == "delay":
