@@ -239,7 +239,7 @@ def smooth_lanes(lanes: Iterable[Lane], priors: Sequence[WrenchPrior]) -> list[W
 
 
 def likelihoods(lanes: Sequence[Lane]) -> Array:
-    """ln p(d) of every lane, comparable within one window. [nats]"""
+    """Log p(d) of every lane, comparable within one window. [nats]"""
     found = np.empty(len(lanes))
     for batch in batches(lanes):
         some = [lanes[i] for i in batch]
