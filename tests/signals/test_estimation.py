@@ -23,7 +23,9 @@ def models(count: int, joints: int, pinned: slice) -> estimation.LinearModel:
     decay[pinned, :, :6] = added[pinned, :, :6] = 0.0
     if pinned.stop and pinned.stop < BLOCKS:
         decay[pinned.stop, :, :6] = 0.0
-    observation = estimation.beside_errors(rng.standard_normal((*shape, 6, joints)))
+    observation = np.zeros((*shape, 6 + joints, joints))
+    observation[..., :6, :] = rng.standard_normal((*shape, 6, joints))
+    observation[..., 6:, :] = np.eye(joints)
     observation[rng.random(shape) < 0.15] = 0.0
     d = 5.0 * rng.standard_normal((*shape, joints))
     white = rng.uniform(0.1, 1.0, (*shape, joints))

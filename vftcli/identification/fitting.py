@@ -32,7 +32,7 @@ from vftcli.identification.training import (
 from vftcli.robots.friction import SMOOTHING
 from vftcli.robots.profile import robot_document
 from vftcli.robots.robot import Robot
-from vftcli.robots.terms import uses_current
+from vftcli.robots.terms import effort_name
 from vftcli.signals.arrays import Array, resample_columns, root_mean_square, root_mean_squares
 from vftcli.signals.estimation import fit_column
 from vftcli.signals.recording import Recording, refuse_repeated_logs
@@ -127,7 +127,7 @@ def score(log: Recording, role: str, profile: Robot, robot: Robot, cutoff: float
     before = root_mean_squares(motion.tau - motion.predicted)
     old, new, measured = profile.torque_constant, robot.torque_constant, motion.tau
     # Torque from currents with the old constants gets the new.
-    if old is not None and new is not None and uses_current(log, profile):
+    if old is not None and new is not None and effort_name(log, profile) == "current":
         measured = measured * (new / old)
     return Trace(motion, role, measured, motion.with_robot(robot).predicted, before)
 

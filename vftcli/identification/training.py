@@ -18,7 +18,7 @@ from vftcli.robots.kernels import (
     torque_regressor,
 )
 from vftcli.robots.robot import Robot
-from vftcli.robots.terms import drive_torque, gravity_torque, uses_current
+from vftcli.robots.terms import drive_torque, effort_name, gravity_torque
 from vftcli.signals.arrays import Array, Indices, Mask, covered, gaps_of, intervals, median_step
 from vftcli.signals.errors import IdentificationError
 from vftcli.signals.filters import STEEP, derivative, zero_phase
@@ -289,7 +289,7 @@ def prepare_training(
 ) -> Training:
     """Training data of a profile's logs, of joints that rub or not."""
     motions = [prepare(recording, robot, cutoff) for recording in recordings]
-    if fit_constants and not all(uses_current(r, robot) for r in recordings):
+    if fit_constants and any(effort_name(r, robot) != "current" for r in recordings):
         raise IdentificationError(
             "--set identify.constants=yes needs motor currents; the logs have torques. Leave it out"
         )

@@ -227,7 +227,10 @@ def guess_columns(columns: Sequence[Array]) -> Guess | None:
     """
     table = np.stack([np.asarray(column[:ROWS], dtype=np.float64) for column in columns], axis=1)
     clock = np.asarray(columns[0][:ROWS])
-    if len(table) < 2 * STEPS[-1] or not np.isfinite(table).all() or not _is_clock(clock):
+    if len(table) < 2 * STEPS[-1] or not np.isfinite(table).all():
+        return None
+    steps = np.diff(clock)
+    if np.any(steps < 0) or np.quantile(steps, 0.95) >= EVEN * median_step(clock):
         return None
     t = (clock - clock[0]).astype(np.float64) * tick_of(clock, "")[0]
     width = table.shape[1]
@@ -257,11 +260,6 @@ def guess_columns(columns: Sequence[Array]) -> Guess | None:
 SINGLE = (("tau",), ("current",), ("tau+g",))
 #: The order in which controllers record their targets, and what they are recorded behind.
 TARGETS = ("current", "target_current", "target_torque")
-
-
-def _is_clock(stamps: Array) -> bool:
-    steps, usual = np.diff(stamps), median_step(stamps)
-    return bool(np.all(steps >= 0) and np.quantile(steps, 0.95) < EVEN * usual)
 
 
 def _begins_with_motion(t: Array, blocks: Sequence[Array]) -> bool:

@@ -62,14 +62,9 @@ def check_effort(recording: Recording) -> None:
         )
 
 
-def uses_current(recording: Recording, robot: Robot) -> bool:
-    """Whether the drive torque comes from motor current."""
-    return effort_name(recording, robot) == "current"
-
-
 def gain_sd(recording: Recording, robot: Robot) -> float:
     """Relative deviation of a log's torques. [1]"""
-    return CONSTANT_SD if uses_current(recording, robot) else SENSOR_SD
+    return CONSTANT_SD if effort_name(recording, robot) == "current" else SENSOR_SD
 
 
 def gravity_torque(robot: Robot, q: Array) -> Array:

@@ -209,12 +209,6 @@ class FilteredBlock(NamedTuple):
     spread: Array  #: Its covariance S, as if it were no spike. (…, n, n)
 
 
-def beside_errors(H: Array) -> Array:
-    """H of a model with n numbers that have errors of their own: [H; I]. (…, N + n, n)"""
-    own = np.broadcast_to(np.eye(H.shape[-1]), (*H.shape[:-2], H.shape[-1], H.shape[-1]))
-    return np.concatenate([H, own], axis=-2)
-
-
 def filtered(model: LinearModel, limit: Array | None = None) -> Iterator[FilteredBlock]:
     """The filter, block by block; νᵀS⁻¹ν beyond `limit` (K, …) is a spike."""
     shape, (size, n) = model.decay.shape[1:], model.observation.shape[-2:]

@@ -26,7 +26,7 @@ from vftcli.signals.arrays import (
     runs_of,
 )
 from vftcli.signals.errors import RobotError
-from vftcli.signals.estimation import LinearModel, beside_errors, log_likelihood, smoothed
+from vftcli.signals.estimation import LinearModel, log_likelihood, smoothed
 from vftcli.signals.remarks import Remark, Where, caution, fact
 from vftcli.wrench.model_error import (
     UNKNOWN,
@@ -147,7 +147,9 @@ def assembled(lanes: Sequence[Lane]) -> LinearModel:
     # Arrays alike in all lanes are held once: G priors of a long log would not fit.
     alike = all(a is b for lane in lanes for a, b in zip(lane[:4], lanes[0][:4], strict=True))
     each = 1 if alike else count
-    d, jacobian = np.zeros((longest, each, n)), np.zeros((longest, each, 6, n))
+    # A wrench and an error a joint: H is [J; 1].
+    d, observation = np.zeros((longest, each, n)), np.zeros((longest, each, 6 + n, n))
+    observation[..., 6:, :] = np.eye(n)
     white = np.full((longest, each, n), UNKNOWN)
     decay, added = np.zeros((2, longest, count, 6 + n))
     for i, ((blocks, process), window, gate, jacobian_in, prior) in enumerate(lanes):
@@ -158,11 +160,11 @@ def assembled(lanes: Sequence[Lane]) -> LinearModel:
         if i < each:
             d[own], white[own] = blocks.d, process.white
             if prior is not None:
-                jacobian[own] = jacobian_in(*window)
+                observation[*own, :6] = jacobian_in(*window)
     # A window begins with the stationary b.
     added[0, :, 6:] /= np.maximum(1.0 - decay[0, :, 6:] ** 2, 1e-9)
     decay[0, :, 6:] = 0.0
-    return LinearModel(d, beside_errors(jacobian), white, decay, added)
+    return LinearModel(d, observation, white, decay, added)
 
 
 class BlockModel(NamedTuple):
