@@ -6,7 +6,7 @@ Run by its path, with the request as JSON on standard input; nothing of vftcli i
 import io
 import json
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from contextlib import redirect_stderr, redirect_stdout, suppress
 from pathlib import Path
 from typing import Any
@@ -19,10 +19,18 @@ def refuse_variable(name: str) -> str:
     )
 
 
-def guarded(load: Callable[[str], Any], xacro: Any, folders: list[Path]) -> Callable[[str], Any]:  # noqa: ANN401
-    """A `load_yaml` that reads below these folders only."""
+def expand(asked: Mapping[str, Any]) -> dict[str, Any]:
+    """Text of the URDF, the files that were read, and why it failed."""
+    import xacro
+    from xacro import substitution_args
+    from xacrodoc import packages
 
-    def load_yaml(filename: str) -> Any:  # noqa: ANN401
+    packages.update_package_cache(asked["packages"])
+    load, around = xacro.load_yaml, map(Path, asked["packages"].values())
+    folders = [Path(asked["path"]).resolve().parent, *(folder.resolve() for folder in around)]
+
+    def load_below(filename: str) -> Any:  # noqa: ANN401
+        """What a file in these folders holds."""
         place = Path(xacro.abs_filename_spec(filename)).resolve()
         if not any(place.is_relative_to(folder) for folder in folders):
             raise PermissionError(
@@ -31,18 +39,7 @@ def guarded(load: Callable[[str], Any], xacro: Any, folders: list[Path]) -> Call
             )
         return load(filename)
 
-    return load_yaml
-
-
-def expand(asked: Mapping[str, Any]) -> dict[str, Any]:
-    """Text of the URDF, the files that were read, and why it failed."""
-    import xacro
-    from xacro import substitution_args
-    from xacrodoc import packages
-
-    packages.update_package_cache(asked["packages"])
-    folders = [Path(asked["path"]).resolve().parent, *map(Path, asked["packages"].values())]
-    xacro.load_yaml = guarded(xacro.load_yaml, xacro, [folder.resolve() for folder in folders])
+    xacro.load_yaml = load_below
     xacro._global_symbols = xacro.create_global_symbols()
     substitution_args._eval_env = refuse_variable
     # The default of a variable, whatever the user's environment holds.

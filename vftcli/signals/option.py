@@ -32,11 +32,7 @@ WORD = re.compile("[a-z][a-z0-9-]+")
 
 
 def text_of(value: object, name: str) -> str:
-    """A value of TOML or Python as typed: yes or no, numbers apart by commas.
-
-    Raises:
-        ParameterError: If it is none.
-    """
+    """A value as typed, yes or no, numbers apart by commas; or a ParameterError."""
     if isinstance(value, bool):
         return "yes" if value else "no"
     each = value if isinstance(value, list | tuple) else [value]
@@ -71,11 +67,7 @@ class Option(NamedTuple):
         return [word for word in self.metavar.split("|") if WORD.fullmatch(word)]
 
     def read(self, typed: Any) -> Any:  # noqa: ANN401 - texts, numbers, lists of them
-        """The value of a typed text, None if nothing was typed.
-
-        Raises:
-            ParameterError: If `metavar` lists words, and it is none of them.
-        """
+        """The value of a typed text, or None; a ParameterError of no word of `metavar`."""
         words = self.metavar.split("|")
         if isinstance(typed, str) and words[1:] and all(map(WORD.fullmatch, words)):
             head = f"--set {self.name}=" if self.is_setting else f"{self.typed} "
@@ -83,11 +75,7 @@ class Option(NamedTuple):
         return self.reads(typed) if self.reads and typed is not None else typed
 
     def keyword(self, value: object, log: type = NoneType) -> object:
-        """A keyword's value as it would be typed, several as a list; None, a `log` as it is.
-
-        Raises:
-            ParameterError: If it is of another kind.
-        """
+        """A keyword's value as typed, or a ParameterError; None and a `log` as they are."""
         if value is None or (not self.metavar and isinstance(value, bool)):
             return value
         if not self.metavar:
@@ -247,11 +235,7 @@ def settings_by_name(choices: Iterable[type[Choice]]) -> dict[str, tuple[Option,
 def settings_as_typed(
     given: Mapping[str, object], choices: Iterable[type[Choice]], by: str = ""
 ) -> dict[str, str]:
-    """Name → text of the choices' settings; `by` is typed before each name.
-
-    Raises:
-        ParameterError: If there is no such setting, or a value is none.
-    """
+    """Name → text of settings, `by` before each name; a ParameterError of others."""
     there = tuple(choices)
     for name in given:
         if not any(kind.takes(name) for kind in there):

@@ -117,11 +117,7 @@ def toml_tables(text: str) -> dict[str, Any]:
 
 
 def toml_file(path: Path, what: str) -> dict[str, Any]:
-    """The tables of a user's file of TOML that is to be `what`, as "a scenario".
-
-    Raises:
-        ParameterError: If it cannot be read, or is no TOML; it names the file.
-    """
+    """The tables of a user's TOML, as "a scenario"; a ParameterError names the file."""
     try:
         with path.open(encoding="utf-8-sig") as file:
             return toml_tables(file.read(LARGEST + 1))
