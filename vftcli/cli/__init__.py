@@ -1,4 +1,4 @@
-"""The command line, one file a command: parse, call, print, exit."""
+"""The command line: parse, call, print, exit."""
 
 import atexit
 import errno
