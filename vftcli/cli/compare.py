@@ -38,30 +38,6 @@ def figure_folder(figures: str | None, output: Path | None, force: bool) -> "Out
     return folder
 
 
-def terminal_text(rows: "pl.DataFrame", analyses: "Sequence[Analysis]", *, details: bool) -> str:
-    """The errors for the terminal; with details pairs of observers."""
-    import polars as pl
-
-    from vftcli.evaluation.errors import POOLED
-    from vftcli.evaluation.intervals import paired_significance
-    from vftcli.outputs.error_tables import to_terminal
-    from vftcli.outputs.grids import pairs_text
-    from vftcli.outputs.screen import MOST_LINES
-
-    text = to_terminal(rows, analyses, every=details)
-    if not details:
-        pooled = rows.filter(recording=POOLED)
-        if text.count("\n") >= MOST_LINES and len(pooled):
-            text = f"{to_terminal(pooled, every=False)}Each log by itself: --details\n"
-        return text + MORE
-    pairs = [
-        paired_significance(a.recording.name, a.estimates, a.reference)
-        for a in analyses
-        if a.reference is not None
-    ]
-    return f"{text}\n{pairs_text(pl.concat(pairs))}" if pairs else text
-
-
 def print_errors(
     form: str,
     rows: "pl.DataFrame",
@@ -70,12 +46,28 @@ def print_errors(
     *,
     details: bool,
 ) -> None:
-    """Print the errors in the form asked for."""
-    from vftcli.outputs.error_tables import FORMS
+    """Print the errors in the form asked for; in details pairs of observers below."""
+    import polars as pl
+
+    from vftcli.evaluation.errors import POOLED
+    from vftcli.evaluation.intervals import paired_significance
+    from vftcli.outputs.error_tables import FORMS, to_terminal
+    from vftcli.outputs.grids import pairs_text
     from vftcli.outputs.run_record import all_remarks
+    from vftcli.outputs.screen import MOST_LINES
 
     if form == "terminal":
-        echo(terminal_text(rows, analyses, details=details))
+        text = to_terminal(rows, analyses, every=details)
+        judging = [(a, a.reference) for a in analyses if a.reference is not None]
+        if not details:
+            pooled = rows.filter(recording=POOLED)
+            if text.count("\n") >= MOST_LINES and len(pooled):
+                text = f"{to_terminal(pooled, every=False)}Each log by itself: --details\n"
+            text += MORE
+        elif judging:
+            pairs = [paired_significance(a.recording.name, a.estimates, r) for a, r in judging]
+            text += f"\n{pairs_text(pl.concat(pairs))}"
+        echo(text)
     elif form == "json":
         every = [remark for a in analyses for remark in all_remarks(a)]
         about = [

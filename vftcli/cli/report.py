@@ -1,7 +1,8 @@
 """`vftcli report` and `vftcli estimate`: logs become folders."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING, Annotated
 
 from vftcli.cli import options as opt
@@ -14,6 +15,7 @@ from vftcli.signals.progress import stage
 if TYPE_CHECKING:
     from vftcli.analysis import Analysis
     from vftcli.outputs.estimates import Group
+    from vftcli.outputs.screen import Canvas
 
 
 class PrintChoice(Choice):
@@ -43,6 +45,7 @@ def report(
     """
     from vftcli.outputs.estimates import FILES, SUMMARY_FILES, extra_files, report_files
     from vftcli.outputs.files import OutputFolder
+    from vftcli.outputs.screen import first_lines
     from vftcli.pipeline import WRITING, analyse_logs, sense
     from vftcli.readers.reading import Library
 
@@ -59,7 +62,7 @@ def report(
         choice = replace(choice, observers=choice.observers.beside_print())
     # One of several logs may lack a wrench; details need it all.
     if len(logs) == 1 and not (json or details) and choice.is_plain:
-        choice = replace(choice, answered=show_first_lines)
+        choice = replace(choice, answered=partial(show_text, first_lines))
     left_out, analyses = LeftOut(library, logs), []
     for made in analyse_logs(logs, choice, left_out.add):
         analyses.append(made)
@@ -91,11 +94,9 @@ def report(
     left_out.end(len(analyses))
 
 
-def show_first_lines(made: "Analysis") -> None:
-    """Print the answer of a log's screen, before observers run."""
-    from vftcli.outputs.screen import first_lines
-
-    show(first_lines(made, canvas()))
+def show_text(text_of: "Callable[[Analysis, Canvas], str]", made: "Analysis") -> None:
+    """Print a text on an analysis."""
+    show(text_of(made, canvas()))
 
 
 def show_answers(
@@ -143,6 +144,7 @@ def estimate(
     from vftcli import pipeline
     from vftcli.outputs.estimates import estimate_files, write_estimate_folder
     from vftcli.outputs.files import OutputFolder
+    from vftcli.outputs.screen import short_screen
     from vftcli.readers.reading import Library
     from vftcli.readers.references import refuse_estimates
     from vftcli.signals.packages import check_installed
@@ -166,24 +168,17 @@ def estimate(
         found: Analysis | Iterator[Group] = pipeline.analysed_in_blocks(recording, choice)
     else:
         if not (json or asked.words["details"]) and choice.is_plain:
-            choice = replace(choice, answered=show_short)
+            choice = replace(choice, answered=partial(show_text, short_screen))
         found = pipeline.analyse(pipeline.prepared(recording, choice), choice)
         if not json:
             if choice.answered is None or found.contacts is None:
-                show_short(found)
+                show_text(short_screen, found)
             say_analysis(found)
         found = pipeline.sense(found, choice)
     made, record = write_estimate_folder(output, found, asked.line, written, force)
     if not json and made is not found:  # of blocks the answer comes at the end
-        show_short(made)
+        show_text(short_screen, made)
         say_analysis(made)
     say_written(record, output, names, json=json)
     if show:
         open_made(output)
-
-
-def show_short(made: "Analysis") -> None:
-    """Print the answer in short."""
-    from vftcli.outputs.screen import short_screen
-
-    show(short_screen(made, canvas()))
