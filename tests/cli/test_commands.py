@@ -14,7 +14,7 @@ from example_logs import BEARING, CIRCLE, EPISODES, TAPS
 from typer.testing import CliRunner
 
 from vftcli.cli import make_app
-from vftcli.cli.thresholds import settled_reference
+from vftcli.cli.contacts import settled_reference
 from vftcli.outputs.conversion import convert
 from vftcli.robots import load_robot
 from vftcli.signals.recording import Recording

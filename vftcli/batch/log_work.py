@@ -7,7 +7,7 @@ free runs, reference) and the program's version.
 
 import hashlib
 import json
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, fields, is_dataclass, replace
 from functools import cache
 from pathlib import Path
@@ -138,13 +138,13 @@ class LogTask(NamedTuple):
 
 def work_on_log(task: LogTask) -> None:
     """Analyse a log and write its result, unless it is there."""
-    folder = BatchFolder(task.folder)
+    folder, job = BatchFolder(task.folder), task.job
     if folder.row_file(task.key).exists():
         return
     begin("reading")
-    choice, library = task.job.choice, Library([task.path])
+    choice, library = job.choice, Library([task.path])
     read = replace(choice.read, episode=task.episode)
-    examiner = Examiner(anyway=task.job.anyway)
+    examiner = Examiner(anyway=job.anyway)
     choice = replace(choice, read=read, library=library, examiner=examiner)
     if choice.read.columns is None:
         refuse_estimates(task.path)
@@ -154,31 +154,26 @@ def work_on_log(task: LogTask) -> None:
     source = replace(recording.source, label=task.label, path=task.path)
     recording = replace(recording, source=source)
     begin("analysing")
-    work: Analyser = list_touches if task.job.do == "contacts" else analyse
+    work: Analyser = list_touches if job.do == "contacts" else analyse
     analysis = work(prepared(recording, choice), choice)
     begin("writing")
-    write_result(folder.path / folder.place(task.key), analysis, task)
-    folder.put_rows(task.key, rows_of(analysis, task.key))
-
-
-def write_result(folder: Path, analysis: Analysis, task: LogTask) -> None:
-    """Write a command's files; `compare` has its rows alone."""
-    job = task.job
+    place, line = folder.path / folder.place(task.key), task.command
     if job.do == "estimate":
         from vftcli.outputs.estimates import write_estimate_folder
 
-        write_estimate_folder(folder, analysis, task.command, job.written, force=True)
+        write_estimate_folder(place, analysis, line, job.written, force=True)
     elif job.do == "report":
         from vftcli.outputs.report import write_report
 
-        write_report(folder, [analysis], command=task.command, force=True, choice=job.written)
-    elif job.do == "contacts":
+        write_report(place, [analysis], command=line, force=True, choice=job.written)
+    elif job.do == "contacts":  # `compare` has its rows alone
         from vftcli.outputs.estimates import CONTACTS
         from vftcli.outputs.files import OutputFolder
         from vftcli.outputs.report import put_contacts
 
-        with OutputFolder(folder, True, CONTACTS) as files:
-            put_contacts(files, "", [analysis], task.command)
+        with OutputFolder(place, True, CONTACTS) as files:
+            put_contacts(files, "", [analysis], line)
+    folder.put_rows(task.key, rows_of(analysis, task.key))
 
 
 Kinds = dict[str, Any]  #: Column → its type in polars.
@@ -223,8 +218,18 @@ JOINED = ("observer", "joint", "axis")  #: Key of an estimate and its error.
 
 def rows_of(analysis: Analysis, key: str) -> pl.DataFrame:
     """The rows of one log; one row without an observer if none ran."""
-    rows = pl.DataFrame([*estimate_sizes(analysis)], schema=OF_ESTIMATE)
-    empty = pl.DataFrame(schema=SCHEMA)
+    sizes, sensed = list[dict[str, Any]](), analysis.virtual_sensor
+    for estimate in analysis.estimates:
+        for joint, column in enumerate(estimate.tau.T, start=1):
+            rms, most = size_of(column)
+            place = {"observer": estimate.name, "joint": joint}
+            sizes.append(place | {"rms_Nm": rms, "p99_Nm": most})
+    for wrench in sensed.wrenches if sensed is not None else ():
+        for k, (axis, column) in enumerate(zip(AXES, wrench.known.T, strict=True)):
+            (rms, most), unit = size_of(column), "N" if k < 3 else "Nm"
+            place = {"observer": wrench.name, "axis": axis}
+            sizes.append(place | {f"rms_{unit}": rms, f"p99_{unit}": most})
+    rows, empty = pl.DataFrame(sizes, schema=OF_ESTIMATE), pl.DataFrame(schema=SCHEMA)
     if analysis.errors is not None:
         others = pl.all().exclude("recording", "samples")
         errors = analysis.errors.select(others, pl.col("samples").alias(COMPARED))
@@ -242,21 +247,6 @@ def rows_of(analysis: Analysis, key: str) -> pl.DataFrame:
     }
     rows = rows.with_columns(pl.lit(facts[n], SCHEMA[n]).alias(n) for n in ("key", *OF_LOG))
     return pl.concat([empty, rows], how="diagonal_relaxed").select(*SCHEMA)
-
-
-def estimate_sizes(analysis: Analysis) -> Iterator[dict[str, Any]]:
-    """Size of each estimate by observer and joint, then by axis."""
-    for estimate in analysis.estimates:
-        for joint, column in enumerate(estimate.tau.T, start=1):
-            rms, most = size_of(column)
-            yield {"observer": estimate.name, "joint": joint, "rms_Nm": rms, "p99_Nm": most}
-    sensed = analysis.virtual_sensor
-    for wrench in sensed.wrenches if sensed is not None else ():
-        for k, (axis, column) in enumerate(zip(AXES, wrench.known.T, strict=True)):
-            (rms, most), unit = size_of(column), "N" if k < 3 else "Nm"
-            yield {
-                "observer": wrench.name, "axis": axis, f"rms_{unit}": rms, f"p99_{unit}": most
-            }  # fmt: skip
 
 
 def size_of(values: Array) -> tuple[float | None, float | None]:

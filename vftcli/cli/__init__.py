@@ -106,7 +106,16 @@ def launch() -> None:
             if signal.getsignal(number) is not signal.SIG_IGN:
                 signal.signal(number, stop)
         open_streams()
-        check_room()
+        with suppress(ImportError):  # Windows has no such limit
+            import resource
+
+            # Under it libraries would end the process.
+            limit = resource.getrlimit(resource.RLIMIT_AS)[0]
+            if limit != resource.RLIM_INFINITY and limit < ROOM:
+                fail(
+                    f"the memory limit of {limit / 1e9:.1f} GB (ulimit -v) is less than the "
+                    f"{ROOM / 1e9:.0f} GB that the libraries reserve; raise it"
+                )
         main()
         code: object = 0
     except SystemExit as end:
@@ -134,19 +143,6 @@ class NoPandas(MetaPathFinder):
 #: Address space that the libraries reserve [B]: with two processors the report of 10 s at
 #: 1 kHz needs 3.0e9, of 20 s at 125 Hz 1.9e9.
 ROOM = 3e9
-
-
-def check_room() -> None:
-    """Refuse a memory limit under which libraries would end the process."""
-    with suppress(ImportError):  # Windows has no such limit
-        import resource
-
-        limit = resource.getrlimit(resource.RLIMIT_AS)[0]
-        if limit != resource.RLIM_INFINITY and limit < ROOM:
-            fail(
-                f"the memory limit of {limit / 1e9:.1f} GB (ulimit -v) is less than the "
-                f"{ROOM / 1e9:.0f} GB that the libraries reserve; raise it"
-            )
 
 
 class Stopped(BaseException):

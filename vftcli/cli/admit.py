@@ -53,9 +53,8 @@ def admit(
     if output is None and (show_made or figures):
         raise typer.BadParameter("--open and --figures are of what -o DIR writes; give -o too")
     opt.form_of(asked)
-    names = files_of_replay(figures)
     if output is not None:
-        OutputFolder(output, force, names).check()
+        OutputFolder(output, force, files_of_replay(figures)).check()
     choice_of = partial(opt.choice_for, library=Library([log] if log else []))
     found = replayed(log, asked, choice_of, release or (), seed)
     show(found, asked.line, json=json, latex=latex)

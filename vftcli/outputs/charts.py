@@ -211,8 +211,7 @@ def even_starts(samples: int, stretches: int) -> Index:
 def extremes(lines: Sequence[Array], starts: Index) -> Index:
     """Lowest and highest known sample of lines (T,) a stretch, else its first."""
     stops, kept = np.append(starts[1:], len(lines[0])), list[Index]()
-    longest = np.arange(max(stops - starts))
-    at = np.minimum(starts[:, None] + longest, stops[:, None] - 1)
+    at = np.minimum(starts[:, None] + np.arange(max(stops - starts)), stops[:, None] - 1)
     for line in lines:
         here = line[at]
         unknown = np.isnan(here)

@@ -251,5 +251,4 @@ def shape_choice_grid(choices: pl.DataFrame) -> Grid:
         for r in choices.iter_rows(named=True)
     ]
     title = "RMS on the fifth of the log left out; the simplest within 1 % of the best is chosen"
-    columns = "friction", *map(Column, ("joint", "RMS [N·m]", ""))
-    return Grid(columns, rows, title)
+    return Grid(("friction", *map(Column, ("joint", "RMS [N·m]", ""))), rows, title)

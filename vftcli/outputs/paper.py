@@ -235,7 +235,7 @@ def line_figure(
 
 
 def draw_plot(axes: "Axes", plot: Plot, *, ends_row: bool = True) -> None:
-    """One panel with contacts, bands and lines, and the chart over it."""
+    """One panel with contacts, bands, lines, the chart over it."""
     from matplotlib.ticker import MaxNLocator
 
     chart, j = plot.chart, plot.panel

@@ -100,7 +100,7 @@ def fewer(corners: Array) -> Surface:
 
 
 def merged(corners: Array, size: float) -> tuple[Index, Index]:
-    """Cells of corners, and triangles between three cells, once. (F, 3)"""
+    """Cells of corners; triangles between three cells. (F, 3)"""
     places = np.floor(corners / size).astype(np.int64)
     x, y, z = np.moveaxis(places - places.min(axis=(0, 1)), -1, 0)
     _, cells = np.unique((x * (y.max() + 1) + y) * (z.max() + 1) + z, return_inverse=True)

@@ -116,13 +116,13 @@ def gather(
 
 
 def files_of(paper: Paper, names: Sequence[str], form: str | None) -> list[str]:
-    """Files of a folder of these items; `form` is the figures' format."""
+    """Files of a folder of these items, figures if `form`."""
     drawn = [name for name in names if paper.items[name].traces]
     return [PAGE, TABLES, SEAL, *figure_files(form, drawn)]
 
 
 def spread(values: Sequence[float | None]) -> str:
-    """Mean over the seeds, range, and number of seeds if some have none."""
+    """Mean over the seeds, range, number of seeds if not all."""
     known = [x for x in values if x is not None and np.isfinite(x)]
     if not known:
         return DASH
@@ -151,7 +151,7 @@ def item_grid(item: PaperItem) -> Grid:
 
 
 def beside_print(item: PaperItem) -> str:
-    """Ours over the print: median and range of the lines with a number."""
+    """Ours over the print: median and range over the lines."""
     ratios = []
     for line in item.lines:
         values = item.values[line.key].get(item.nearest, ())

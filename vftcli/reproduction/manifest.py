@@ -171,7 +171,7 @@ class Rival:
     inputs: str = ""  #: Signals that it reads.
 
     def file(self, log: BenchmarkLog, *endings: str) -> Path | None:
-        """A log's file with one of these endings, or None; its estimates."""
+        """A log's file of these endings, else of estimates, or None."""
         names = (f"{log.name}.{end}" for end in endings or ("parquet", "csv"))
         tries = (Path(self.folder, name) for name in names)
         return next(filter(Path.is_file, tries), None)
@@ -253,7 +253,7 @@ class Manifest:
 
 
 def load_manifest(name: str, data: Path | None) -> Manifest:
-    """A built-in manifest or a user's; logs are beside it or in `data`."""
+    """A built-in manifest or a user's; logs beside it or in `data`."""
     path = Path(name)
     if name in BUILT_IN:
         path = Path(__file__).with_name(f"{name}.toml")

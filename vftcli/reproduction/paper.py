@@ -118,7 +118,7 @@ def load_paper(name: str) -> Paper:
 
 
 def lines_of(row: Sequence[Any], each: Mapping[str, Mapping[str, str]]) -> Iterator[PrintedLine]:
-    """The lines of a row: one for every choice of the names in braces."""
+    """The lines of a row, one for each of the names in braces."""
     line = PrintedLine(*row)
     names = re.findall(r"{(\w+)}", line.key)
     choices = list(product(*(each[name].items() for name in names)))

@@ -180,7 +180,7 @@ def first_order_loops(p: Array, mu: Array, step: float) -> tuple[Array, Array]:
 
 
 def taylor_exponential(A: Array) -> Array:
-    """exp(A) by its Taylor series to the fifth order, as in the paper."""
+    """exp(A) by its Taylor series to the fifth order."""
     term = total = np.eye(len(A))
     for k in range(1, 6):
         term = term @ A / k
@@ -202,7 +202,7 @@ def held_matrices(step: float, q_p: Array, q_tau: Array) -> tuple[Array, Array, 
 def dense_kalman_loop(
     p: Array, mu: Array, step: float, kalman: KalmanObserver, *, rebuild: bool = False
 ) -> Array:
-    """Textbook Kalman filter; `rebuild` makes its matrices at every sample."""
+    """Textbook Kalman filter; `rebuild`: matrices at every sample."""
     n = p.shape[1]
     prior, densities = kalman.first_prior(step, n), kalman.densities(n)
     R = np.diag(kalman.model(step, n).r)

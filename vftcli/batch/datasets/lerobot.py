@@ -31,7 +31,7 @@ class LeRobotDataset:
         self.folder = folder
 
     def files(self) -> Iterator[DataFile]:
-        """The data files with their episodes, in the order of these."""
+        """The data files with their episodes, in order."""
         numbers: dict[Path, list[int]] = {}
         for number, path in dataset_episodes(self.folder).items():
             numbers.setdefault(path.relative_to(self.folder), []).append(number)
@@ -124,7 +124,7 @@ class LeRobotDataset:
     def _finish_episodes(
         self, path: Path, columns: ForceColumns, statistics: OfEpisodes, copy: Path
     ) -> None:
-        """Write a table of episodes, with the columns' statistics."""
+        """Write a table of episodes, with statistics."""
         import pyarrow as pa
         import pyarrow.parquet as pq
 
@@ -187,7 +187,7 @@ def write_json(path: Path, value: Any) -> None:  # noqa: ANN401 - what JSON hold
 
 
 def with_features(metadata: Mapping[bytes, bytes], columns: ForceColumns) -> dict[bytes, bytes]:
-    """A Parquet schema's metadata with the columns' features."""
+    """A Parquet schema's metadata with the new features."""
     try:
         library = json.loads(metadata.get(METADATA, b"null"))
         features = library["info"]["features"]
