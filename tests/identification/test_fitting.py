@@ -367,7 +367,8 @@ def sine_motion(prepared, sines):
 
 def trace(sine_motion, residual, role="held-out"):
     nothing = np.zeros(sine_motion.q.shape[1])
-    return Trace(sine_motion, role, residual, np.zeros_like(residual), nothing)
+    rms = root_mean_squares(residual)
+    return Trace(sine_motion, role, residual, 0.0 * residual, residual, rms, nothing)
 
 
 def test_rigid_torque_is_pinocchios_without_rotors(sine_motion):

@@ -75,22 +75,14 @@ class Trace(NamedTuple):
     role: str  #: "train" or "held-out".
     measured: Array  #: Drive torque, by the new constants. (M, n) [N·m]
     predicted: Array  #: Torque that the identified robot expects. (M, n) [N·m]
+    residual: Array  #: Measured less predicted. (M, n) [N·m]
+    rms: Array  #: RMS of that. (n,) [N·m]
     before: Array  #: RMS that the profile leaves. (n,) [N·m]
 
     @property
     def where(self) -> Where:
         """The log as a remark's place."""
         return Where(self.motion.recording.name)
-
-    @property
-    def residual(self) -> Array:
-        """Measured less predicted. (M, n) [N·m]"""
-        return self.measured - self.predicted
-
-    @property
-    def rms(self) -> Array:
-        """RMS of the residual in each joint. (n,) [N·m]"""
-        return root_mean_squares(self.residual)
 
     def rows(self, index: int) -> list[tuple[str, int, str, str, int, float, int]]:
         """Rows of `RESIDUALS` of this log and index."""
@@ -129,7 +121,9 @@ def score(log: Recording, role: str, profile: Robot, robot: Robot, cutoff: float
     # Torque from currents with the old constants gets the new.
     if old is not None and new is not None and effort_name(log, profile) == "current":
         measured = measured * (new / old)
-    return Trace(motion, role, measured, motion.with_robot(robot).predicted, before)
+    predicted = motion.with_robot(robot).predicted
+    residual = measured - predicted
+    return Trace(motion, role, measured, predicted, residual, root_mean_squares(residual), before)
 
 
 def score_remarks(traces: Sequence[Trace]) -> Iterator[Remark]:

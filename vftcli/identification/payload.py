@@ -114,12 +114,7 @@ class JointsFit(NamedTuple):
     left: Array  #: Its residual. (N, n)
     weights: Array  #: Of samples and joints, 0 where empty. (N, n)
     A: Array  #: Columns times weights. (N, n, k)
-
-    @property
-    def inverse(self) -> Array:
-        """(AᵀA)⁻¹, columns scaled; zero without data. (k, k)"""
-        flat = self.A.reshape(-1, self.A.shape[2])
-        return inverse_of(flat.T @ flat)
+    inverse: Array  #: (AᵀA)⁻¹, columns scaled; zero without data. (k, k)
 
     def cluster_covariance(self, clusters: Sequence[slice | Indices]) -> Array:
         """Covariance of x with residuals that clusters share. (k, k)
@@ -158,10 +153,11 @@ def fit_all_joints(A: Array, y: Array, usable: Array) -> JointsFit:
     for passes in range(PASSES + 1):
         w = np.sqrt(usable) / np.maximum(root_mean_squares(left), 1e-9)
         weighted = A * w[:, :, None]
+        flat = weighted.reshape(-1, A.shape[2])
         if passes < PASSES:
-            x = solve(weighted.reshape(-1, A.shape[2]), (y * w).ravel())
+            x = solve(flat, (y * w).ravel())
             left = y - np.einsum("knp,p->kn", A, x)
-    return JointsFit(x, left, w, weighted)
+    return JointsFit(x, left, w, weighted, inverse_of(flat.T @ flat))
 
 
 def payload_from_pair(first: Recording, second: Recording, robot: Robot) -> LoadFit:
