@@ -55,8 +55,7 @@ def phases(wrench: Array, parameters: Admittance, before: Mask | bool = False) -
 class AxisMotion(NamedTuple):
     """Motion of the flange: one row a control period, one column a controller.
 
-    Row k + 1 follows from row k and the force of row k. All components are in base axes;
-    the rotation is the vector log(R R_dᵀ).
+    Row k + 1 follows from row k and its force. Axes are the base's, rotations log(R R_dᵀ).
     """
 
     t: Array  #: Time of T + 1 rows, T control periods. (T+1,) [s]
@@ -119,8 +118,7 @@ def run(
 ) -> AxisMotion:
     """The motion under one force record and its phases.
 
-    Force (T, 6) [N, N·m] and phases (T, 6) are those of `Phases`, the start that of
-    `Recursion`. A law may end in infinities: see `AxisMotion.escaped`.
+    Force and phases (T, 6) are those of `Phases`. A law may end in infinities.
     """
     state = Recursion(controllers, x, v)
     rows = [(state.x, state.v)]

@@ -87,10 +87,9 @@ def stated_band(run: Run, called: FreeError | None, off_sd: Array | None) -> Arr
 def budget(found: Baseline, spectra: Spectra, reading: FreeReading) -> dict[str, Array]:
     """RMS of an observer's error by each cause, estimated from the log. (n,) [N·m]
 
-    Noise is the flat floor of S_n through |H|²; bandwidth ∫|1−H|²S_τ df. Other readings
-    on the free part are model error: friction as far as sign and size of a joint's
-    velocity explain it, else the rest of the model. Stiction at rest is the dry friction
-    a resting joint may hide, F_c/√3, times its share of time at rest.
+    Noise is the flat floor of S_n through |H|²; bandwidth ∫|1−H|²S_τ df. Other readings on
+    the free part are friction, as far as velocity explains them, else the model. Stiction
+    is the dry friction a resting joint may hide, F_c/√3, times its share of time at rest.
     """
     asked = spectra.frequency, spectra.step, spectra.joints
     response = reading.observer.frequency_response(*asked)

@@ -90,12 +90,12 @@ class Contact(Shown):
     joint_torque: Array  #: Torque on each joint at the peak. (n,) [N·m]
     joint_torque_sd: Array  #: Its standard deviation. (n,) [N·m]
     at_rest: bool  #: Whether no joint moves at the peak.
-    #: |F| of the log's own torque estimate at the peak, None without one. [N]
+    #: |F| by the log's own torque at the peak. [N]
     vendor_force: float | None = None
-    #: |F| of the log's own wrench at the peak, None without one. [N]
+    #: |F| by the log's own wrench at the peak. [N]
     sensor_force: float | None = None
     course: ForceCourse | None = None  #: |F| from start to end, or None.
-    #: Whether neither free motion nor a reference checks its size.
+    #: Whether nothing known checks its size.
     inferred: bool = False
     remarks: tuple[Remark, ...] = ()  #: Limits of this row.
 
@@ -171,7 +171,7 @@ class Contact(Shown):
 
     @property
     def trust(self) -> Trust:
-        """Trust in the size of the row, by its evidence, band and remarks."""
+        """Trust in the row's size, by evidence, band and remarks."""
         force, narrow, wide = self.peak_force, self.place_band, self.peak_band
         doubted = self.remarks or self.is_load or (self.evidence or 0.0) < SURE_NATS
         if doubted or force is None or narrow is None or wide is None:
@@ -190,14 +190,14 @@ def numbered(rows: Sequence[Contact], *, inferred: bool) -> tuple[Contact, ...]:
 
 
 class CarriedLoad(NamedTuple):
-    """A load that the arm carries and its model lacks; it is in no row."""
+    """A load that the model lacks; it is in no row."""
 
     mass: float  #: Its mass. [kg]
     sd: float  #: Standard deviation of the mass. [kg]
     robot: str  #: The model's name.
-    #: The payload of the robot's file that weighs as much, None without one.
+    #: The robot's payload that weighs as much, if any.
     payload: str | None
-    #: From the arm's first motion to its last, in which it is weighed. [s]
+    #: From first to last motion, in which it is weighed. [s]
     span: tuple[float, float]
 
     @classmethod
@@ -228,7 +228,7 @@ class Unexplained(NamedTuple):
 class ContactModel(Shown):
     """Noise model behind a list, for `run.json`."""
 
-    #: Prior of the contacts' wrench, None if it was not learned.
+    #: Prior of the contacts' wrench, if learned.
     prior: "WrenchPrior | None"
     noise_sd: Array  #: √R of each joint. (n,) [N·m]
     error_sd: Array  #: Standard deviation of the model error. (n,) [N·m]
@@ -243,22 +243,22 @@ class ContactList(Shown):
     recording: str  #: The log's label.
     duration: float  #: Its length. [s]
     contacts: tuple[Contact, ...]  #: The contacts, in the order of time.
-    #: Possible contacts, or errors of the model, of less evidence.
+    #: Possible contacts, of less evidence.
     candidates: tuple[Contact, ...] = ()
     basis: "Basis"  #: Tells contact from model error.
-    #: Remarks on known free motion; none where nothing is known.
+    #: Remarks on known free motion.
     free: tuple[Remark, ...] = ()
     free_seconds: float = 0.0  #: Length of the free motion. [s]
-    #: Contacts listed in the log's own free part, None where it has none.
+    #: Contacts listed in the log's own free part, if any.
     false_on_free: int | None = None
     threshold: float | None = None  #: Least evidence of a contact. [nats]
-    #: The smallest force that this log can tell, None without a wrench. [N]
+    #: The smallest force that this log can tell. [N]
     smallest_force: float | None = None
     #: The largest torque if nothing can be listed, else None.
     unexplained: Unexplained | None = None
     #: A load that the model lacks, None where none shows.
     load: CarriedLoad | None = None
-    #: When the arm stopped so abruptly that what follows is no contact. [s]
+    #: When the arm stopped too abruptly for a contact. [s]
     stops: tuple[float, ...] = ()
     model: ContactModel  #: Noise model behind the list.
     remarks: tuple[Remark, ...] = ()  #: Limits of the whole list.

@@ -50,7 +50,7 @@ from vftcli.wrench.smoother import (
     in_blocks,
 )
 
-GAIN = 30.0  #: Gain of the momentum observer that has a threshold. [1/s]
+GAIN = 30.0  #: Gain of the momentum observer. [1/s]
 #: Block of short contacts: longer ones cut the peak. [s]
 FINE = 0.008
 SETTLED = 0.3  #: Start of a log that the observer is left. [s]
@@ -60,7 +60,7 @@ LASTING, NEAR = 0.05, 0.2
 LEAST_MOVING = 50  #: Fewest samples in motion for a level of a joint.
 #: Basis that tells contact from model error.
 Basis = Literal["free motion", "whole log", "friction", "none"]
-#: Remarks of the fit of the whole log on one that is too short for it.
+#: Remarks of the whole log's fit on one that is too short.
 SHORT_LOG = {"whole-log-too-short", "whole-log-friction-unclear"}
 #: Fewest whole cycles of which free ones can be found.
 LEAST_CYCLES = 2
@@ -74,10 +74,10 @@ class FreeStatistics:
 
     noise: TorqueNoise  #: Noise and model error.
     level: Array  #: SD of the momentum observer's torque in it. (n,) [N·m]
-    own: Mask  #: Samples of the log itself that are known to be free. (T,)
-    #: The log, less its load, and less the model error if known.
+    own: Mask  #: Samples of the log itself that are free. (T,)
+    #: The log, less its load and model error.
     log: Run
-    free: tuple[RunSamples, ...]  #: Every free piece, less a load that it carries.
+    free: tuple[RunSamples, ...]  #: Every free piece, less its load.
     #: A load that the model lacks, None where none shows.
     load: FreeLoad | None
     #: Its origin, and a load that it carries.
@@ -267,8 +267,7 @@ def self_test(free: FreeStatistics, prior: WrenchPrior) -> Array:
 def listed_force(free: FreeStatistics, log: BlockLog, least: float, untold: Mask) -> float:
     """The force that lists 95 % of trial pushes at the flange. [N]
 
-    Each lasts `PSEUDO`, somewhere in the log, in any direction. Without it the model error
-    explains its torque: evidence ½F² Σν²/S, ν of 1 N. At rest F_c must give way first.
+    Of evidence ½F² Σν²/S, ν of 1 N, for `PSEUDO`; at rest F_c must give way first.
     """
     blocks, process = log
     count = len(blocks.t)

@@ -48,7 +48,7 @@ from vftcli.signals.rest import MOVES, REST, faster
 from vftcli.wrench.model_error import error_process
 from vftcli.wrench.smoother import DRIVES, BlockLog, BlockSpan, hidden_by_blocks, smooth_wrench
 
-SHORTEST = 0.5  #: No contact is listed in a log shorter than this. [s]
+SHORTEST = 0.5  #: Shortest log with contacts. [s]
 SLOWEST = 10.0  #: Rate below which a push may go unseen. [Hz]
 #: Evidence over that of any row in the log's own free part.
 FALSE_MARGIN = 1.5
@@ -224,7 +224,7 @@ def false_rows(free: FreeStatistics) -> int:
 
 
 def without_list(run: Run) -> ContactList:
-    """A list without rows: nothing tells a contact from an error of the model."""
+    """A list without rows: nothing tells contact from model error."""
     unknown = np.full(run.robot.joints, np.nan)
     torque = abs(observed(run))
     torque[run.t < run.t[0] + SETTLED] = 0.0
@@ -274,8 +274,7 @@ def is_load(recording: Recording, contacts: Sequence[Contact]) -> bool:
 def load_row(motion: FreeMotion, contacts: Sequence[Contact]) -> Contact | None:
     """One row for contacts that are a load: the ungated wrench's mean.
 
-    None if less than half of it acts between them. SD of the mean:
-    √(s²/m + (3 % of it)²), s the spread of m means over 5 s.
+    None if less than half acts between them. SD √(s²/m + (3 % of it)²), of m means over 5 s.
     """
     part = free_part(motion)
     wrench = smooth_wrench(motion.log, () if part is None else part.pieces)

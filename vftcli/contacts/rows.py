@@ -34,7 +34,7 @@ from vftcli.wrench.smoother import BENT, BlockLog, JacobianIn, WrenchPrior, hidd
 
 #: Factors on SDs of force and moment, by simulation: friction is not Gaussian.
 WIDENED = np.repeat([1.3, 2.0], 3)
-BESIDE = 0.1  #: A cut this near to a row may have removed a part of it. [s]
+BESIDE = 0.1  #: A cut this near may have removed a part of a row. [s]
 #: Share of its bend that a short contact's peak may hide.
 BENT_SHORT = 0.4
 #: Least correlation time of a contact, as a share of its length.
@@ -269,7 +269,7 @@ def shows_force(row: Contact, smallest: float) -> bool:
 
 
 def force_course(t: Array, force: Array, covariance: Array) -> ForceCourse:
-    """|F| of a force (K, 3) [N] of covariance (K, 3, 3), band along the force."""
+    """|F| of a force (K, 3) [N], and its band by a covariance."""
     size = np.linalg.norm(force, axis=1)
     u = force / np.maximum(size, 1e-12)[:, None]
     return ForceCourse(t, size, Z_95 * np.sqrt(np.einsum("ki,kij,kj->k", u, covariance, u)))

@@ -199,8 +199,7 @@ def filtered_odds(
 ) -> Array:
     """Log odds ln P(contact)/P(free) along S searches side by side. (K, S)
 
-    The arrays are (K, S, n): d, decay, added, white and spikes of b, the variance of a
-    contact's torque; dt (K, S, 1) is the time from the block before.
+    Arrays are (K, S, n), of b and of a contact's torque; dt (K, S, 1) is from block to block.
     """
     count, n = d.shape[1:]
     time, lasts = np.tile(np.transpose(SEARCHES), count // len(SEARCHES))

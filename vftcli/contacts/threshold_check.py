@@ -33,8 +33,7 @@ GAIN = 10.0  #: Of the momentum observer. [1/s]
 def compared_signals(run: Run) -> ComparedSignals:
     """Signals that a robot would compare along a log.
 
-    The wrench is the log's own if the robot made it (one in sensor axes is an instrument's),
-    else by least squares from the torque, in base axes about the flange point.
+    The wrench is the robot's own, else by least squares in base axes about the flange point.
     """
     # Without a model nothing else checks the joints.
     log = run.recording
@@ -93,7 +92,7 @@ class ThresholdDetection(NamedTuple):
 
     @property
     def figures(self) -> dict[str, float]:
-        """Delays and peak forces of those detected and missed, NaN without any."""
+        """Delays and peak forces of those detected and missed, or NaN."""
         delays = [c.delay for c in self.detected]
         peaks = [c.peak_force for c in self.detected]
         missed = [c.peak_force for c in self.contacts if not (c.by or c.already_above)]
@@ -111,10 +110,9 @@ def check_contacts(
     reference: ExternalTorque | None,
     wrench: Wrench | None,
 ) -> ThresholdDetection:
-    """Contacts of a log that a joint or an axis detects at the thresholds.
+    """Contacts of a log that the thresholds detect.
 
-    Detected: a signal passes its threshold during the contact; one beyond it since before
-    says nothing. Contacts before the settling are left out.
+    A signal that passes its threshold during the contact detects it, if not above before.
     """
     t, duration = signals.t, signals.recording.duration - SETTLING
     level = np.column_stack([thresholds.level(name, signals) for name in ("joints", "axes")])

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 SETTLING = 2.0  #: Left out at every log's start: observers rise. [s]
 BLOCK = 1.0  #: Length of the blocks of which maxima are used. [s]
 APART = 0.5  #: Passages closer than this are one event. [s]
-KNOWN = 0.5  #: A block counts if at least this share of its samples is known.
+KNOWN = 0.5  #: Least share of known samples of a block.
 #: Maxima that tell a tail; below four its interval has no lower end.
 ENOUGH = 5
 #: Readings in a tail: at least, in each hour, and per block.
@@ -64,9 +64,8 @@ class Tail(NamedTuple):
     def threshold(self, rate: float) -> tuple[float, tuple[float, float]]:
         """The level passed at a rate [1/h], u + e ln(λ/rate), and the ends of its 95 %.
 
-        They are those of e, (1 ± 1.96/√k) e, the lower one u at the least. Above λ the tail is
-        not used: of m events in all the level is the m-th largest maximum, of m its 95 %,
-        m ± 1.96 √m.
+        By (1 ± 1.96/√k) e, the lower one u at the least. Above λ: of m events the level is the
+        m-th largest maximum, 95 % m ± 1.96 √m.
         """
         if rate <= self.rate:
             step = self.excess * np.log(self.rate / rate)
@@ -100,9 +99,9 @@ def tail_of(maxima: Array) -> Tail | None:
 #: So many false alarms show a rate; fewer extrapolate it.
 DUE = 3.0
 LEAST = 1e-9  #: In place of a threshold of zero. [N·m, N]
-#: A log of this length has enough readings to tell its own tail. [s]
+#: Shortest log that tells its own tail. [s]
 LONG_ENOUGH = SETTLING + 5 * ENOUGH * BLOCK
-SELDOM = 0.5  #: A wrench known in a smaller share of samples gets a remark.
+SELDOM = 0.5  #: Least share of samples with a wrench.
 
 
 class ComparedSignals(NamedTuple):
@@ -110,7 +109,7 @@ class ComparedSignals(NamedTuple):
 
     recording: Recording  #: The log.
     torque: Array  #: Estimated external torque. (T, n) [N·m]
-    #: Force, then moment, NaN where the pose cannot tell them; no column for an arm of
+    #: Force, then moment, NaN where unknown; no column for an arm of
     #: fewer than six joints. (T, 6) [N, N·m]
     wrench: Array
     of_vendor: bool  #: Whether the torque is the robot's own estimate.
@@ -228,8 +227,7 @@ class Thresholds(Shown):
 def find_thresholds(free: Sequence[ComparedSignals], rate: float) -> Thresholds:
     """Thresholds that motion like that of some logs passes at a rate.
 
-    Every signal of a set of n gets rate/n [1/h]; the log that needs the highest threshold
-    sets it. A log too short for a tail counts by its largest reading beside a longer one.
+    Each of n signals gets rate/n [1/h]; the log that needs the highest threshold sets it.
     """
     if not (np.isfinite(rate) and rate > 0.0):
         raise ParameterError(f"--rate {rate:g} is not a positive number of false alarms per hour")

@@ -30,8 +30,8 @@ FIRST_LINK = 2
 #: Lever of a force about the flange or a link's middle. [m]
 LEAST_LEVER = 0.1
 FORCE_PRIOR = 100.0  #: SD that a force is given beforehand. [N]
-ALIKE = 4.0  #: Points with a score within this of the best one's fit as well.
-#: χ² of the best point beyond which a contact is more than a force at a point.
+ALIKE = 4.0  #: Points this near to the best score fit too.
+#: χ² of the best point beyond which a contact is no point force.
 MORE_THAN_A_FORCE = 20.0
 
 
@@ -111,7 +111,7 @@ def point_fits(chain: Chain, q: Array, torque: Array, sd: Array) -> list[PointFi
     return [PointFit(*each) for each in zip(*columns, forces[order], bands[order], strict=True)]
 
 
-MARGIN = 1.0  #: Length of a window beyond its contacts on either side. [s]
+MARGIN = 1.0  #: Length of a window beyond its contacts. [s]
 NEAR = 0.4  #: That length where only the prior is learned. [s]
 CERTAIN = 1e-30  #: Least variance of the model error. [(N·m)²]
 MOST_LANES = 96  #: Lanes that are worked on at once.
@@ -216,7 +216,7 @@ def quiet_error(d: Array, process: ErrorProcess) -> tuple[Array, Array]:
 
 
 def batches(lanes: Sequence[Lane]) -> Iterator[list[int]]:
-    """Numbers of lanes of about equal length, so that little is padded."""
+    """Numbers of lanes of about equal length."""
     length = np.array([len(lane.gate) for lane in lanes])
     left = length.argsort(kind="stable")
     while left.size:

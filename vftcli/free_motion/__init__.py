@@ -114,7 +114,7 @@ class FreeChoice(Choice):
 
     @property
     def is_given(self) -> bool:
-        """Whether the user stated the free part; then it is not doubted."""
+        """Whether the user stated the free part."""
         return bool(self.logs or self.spans or self.cycles)
 
     @classmethod

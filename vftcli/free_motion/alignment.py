@@ -21,16 +21,16 @@ from vftcli.signals.recording import Recording
 LEAST_OVERLAP = 0.3  #: Least overlap, by the shorter log.
 #: A larger difference after alignment means another trajectory. [rad]
 SAME_TRAJECTORY = 0.05
-#: A larger difference of clock rates is refused, a smaller corrected.
+#: A larger difference of clock rates is refused.
 SAME_RATE = 0.01
 #: Largest distance of a shift to refine, by the motion's own spread.
 SHORTLIST = 0.15
 #: Largest ratio of distances of two shifts that fit equally.
 ALIKE = 3.0
-#: Or this distance, by the motion's own spread: no servo repeats better.
+#: Or this distance, by the motion's spread: no servo repeats better.
 LEAST_ALIKE = 0.001
 RIVALS = 40  #: Most shifts of longer overlap to try.
-COARSE = 300  #: Instants compared in the search for a shared part.
+COARSE = 300  #: Instants in the search for a shared part.
 
 #: Largest distance at another speed, by the motion's own spread: true pairs
 #: leave .003, other motions with a fitting rate 1.3 and more.
@@ -55,9 +55,8 @@ class Alignment(NamedTuple):
 def align(recording: Recording, free: Recording) -> Alignment:
     """Shift at which `free` passes the recording's joint positions.
 
-    A coarse shift minimises the mean squared position difference by FFT on an even clock.
-    Gauss–Newton, robust against contacts, refines shift and ratio of rates. Of a motion's
-    whole periods the shift with most overlap wins.
+    An FFT on an even clock finds the coarse shift, Gauss–Newton refines it and the rates.
+    Of a motion's whole periods the shift with most overlap wins.
     """
     problem, hints = "", (free.robot_hint, recording.robot_hint)
     if free.joints != recording.joints:

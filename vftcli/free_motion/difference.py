@@ -312,12 +312,10 @@ def error_model(
     """The error of a difference.
 
     Its square is the sum of
-    - noise: √2·K·σ_i without repetition, measured on the difference itself: ripple that repeats
-      does not count, the correction's noise does; the larger of the band about the cutoff, as if
-      white, and the quietest seconds;
-    - motion: the model's torque of the motion difference, with Coulomb friction that reverses at
-      another instant; all of it without the correction, else the model's relative error on
-      the free run's own torque;
+    - noise: √2·K·σ_i without repetition, measured on the difference itself; the larger of
+      the band about the cutoff, as if white, and the quietest seconds;
+    - motion: the model's torque of the motion difference, all of it without the correction,
+      else the model's relative error on the free run's own torque;
     - stiction where a joint stops: two torques anywhere within ±F_c differ by √(2/3)·F_c, after
       a stop shorter than `STUCK` by its share, by `REPEATED_STOP` where the whole arm rests.
 
@@ -358,9 +356,8 @@ def error_model(
 def noise_of(t: Array, x: Array, moving: Mask, step: float, cutoff: float | None) -> Array:
     """Noise of a difference. (n,) [N·m]
 
-    Without a low-pass from second differences: x_{k−1} − 2x_k + x_{k+1} of white noise σ
-    on a smooth signal has √6·σ. With one from the band about its cutoff, at least
-    `LEAST_BAND`, as contacts fill lower ones; assumed as dense throughout.
+    Without a low-pass from second differences, √6·σ of white noise σ. With one from the
+    band about its cutoff, at least `LEAST_BAND`, as contacts fill lower ones.
     """
     if cutoff is None:
         return np.asarray(rms(np.diff(x, 2, axis=0), moving[1:-1]) / np.sqrt(6.0))

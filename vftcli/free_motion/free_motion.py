@@ -18,13 +18,7 @@ import numpy as np
 
 from vftcli.free_motion import FreeChoice
 from vftcli.free_motion.alignment import Alignment, align
-from vftcli.free_motion.cycles import (
-    Cycles,
-    FreeCycles,
-    find_free_cycles,
-    find_period,
-    segment,
-)
+from vftcli.free_motion.cycles import Cycles, FreeCycles, find_free_cycles, find_period, segment
 from vftcli.free_motion.difference import Pairing, pair_with_run
 from vftcli.robots.chain import Chain, Payload
 from vftcli.robots.kernels import load_regressor, load_wrench, momentum_terms

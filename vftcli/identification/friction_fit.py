@@ -200,8 +200,7 @@ def all_residuals(data: Training, fits: Mapping[int, JointFit]) -> list[Array]:
 def choose_presliding(joints: Sequence[JointData]) -> PreslidingScore:
     """One presliding length for the whole arm by cross-validation, or none.
 
-    An observer's band decides: in a wider one a slow step drowns in noise. The shortest of
-    the nearly best wins: it forgets its start soonest.
+    An observer's band decides; the shortest of the nearly best wins: it forgets soonest.
     """
     lengths = (0.0, *PRESLIDING_LENGTHS)
     # One way only, the play operator is constant.

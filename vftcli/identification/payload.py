@@ -8,12 +8,7 @@ import numpy as np
 
 from vftcli.free_motion.free_motion import LEAST, PARTLY, SURE, columns, with_point_mass
 from vftcli.identification.shapes import round_digits
-from vftcli.identification.training import (
-    STATIC,
-    PreparedLog,
-    load_columns,
-    prepare,
-)
+from vftcli.identification.training import STATIC, PreparedLog, load_columns, prepare
 from vftcli.readers.table import listed
 from vftcli.robots.chain import Payload
 from vftcli.robots.friction import SMOOTHING
@@ -226,8 +221,7 @@ def find_time_shift(motion: PreparedLog, other: Recording) -> tuple[float, float
 def payload_from_poses(recordings: Sequence[Recording], robot: Robot) -> LoadFit:
     """A load from poses at rest, by torque beyond the robot's own gravity.
 
-    The model's errors and the drives' day are alike in all poses of a log: the difference of
-    several logs is part of the SDs, of one what the links may be wrong by.
+    The logs' differences are part of the SDs; of one log what the links may be wrong by.
     """
     each = [resting_poses(recording, robot) for recording in recordings]
     q, torque = (np.concatenate(parts) for parts in zip(*each, strict=True))

@@ -11,12 +11,7 @@ import numpy as np
 from vftcli.identification.shapes import Shape, term_values
 from vftcli.robots.chain import Chain
 from vftcli.robots.friction import RunningFriction, friction_factor, measured_temperature, play
-from vftcli.robots.kernels import (
-    INERTIAL_NAMES,
-    LINK,
-    chain_parameters,
-    torque_regressor,
-)
+from vftcli.robots.kernels import INERTIAL_NAMES, LINK, chain_parameters, torque_regressor
 from vftcli.robots.robot import Robot
 from vftcli.robots.terms import drive_torque, effort_name, gravity_torque
 from vftcli.signals.arrays import Array, Indices, Mask, covered, gaps_of, intervals, median_step

@@ -265,8 +265,7 @@ def kalman_steps(
 ) -> tuple[Array, Array, KalmanState]:
     """τ̂ and √P₂₂ of a block with the input d [N·m·s], gains step by step. (T, n)
 
-    `model_of` sample times [s] and joints is the discrete model, `guess` the stationary
-    posterior (n,), `state` that before the block.
+    `guess` is the stationary posterior (n,), `state` that before the block.
     """
     samples, n = d.shape
     tau, sd = empty_series(samples, n), empty_series(samples, n)

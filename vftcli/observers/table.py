@@ -166,9 +166,8 @@ class Entry(NamedTuple):
 def build_first_order(setup: Setup, name: str) -> Built:
     """The fdo or gmo with its gain (n,) [1/s], and a remark if nobody gave it.
 
-    Then it is the inverse of the Kalman filter's delay, a file's R and Q read as densities,
-    or `FALLBACK_RATE` without any gains; at most 2/Ts, each sample's raw disturbance:
-    above, the observer would overshoot. The fdo has one gain, that of the mean delay.
+    Then the inverse of the Kalman filter's delay, or `FALLBACK_RATE`; at most 2/Ts, above
+    which it would overshoot. The fdo has one gain, that of the mean delay.
     """
     (parameter,), given = PARAMETERS[name], parameters_given(setup, name, name)
     full, origin = f"{name}.{parameter}", ""
