@@ -62,33 +62,11 @@ else:
 __version__ = VERSION
 
 __all__ = [
-    "Analysis",
-    "DynamicsTerms",
-    "ExternalTorque",
-    "FilteredDynamicsObserver",
-    "KalmanObserver",
-    "MomentumObserver",
-    "Payload",
-    "Recording",
-    "Robot",
-    "Run",
-    "VftError",
-    "admit",
-    "compare",
-    "contacts",
-    "estimate",
-    "evaluate",
-    "flange_jacobian",
-    "identify",
-    "inspect",
-    "link_poses",
-    "load_robot",
-    "read",
-    "report",
-    "rmse",
-    "simulate",
-    "thresholds",
-]
+    "Analysis", "DynamicsTerms", "ExternalTorque", "FilteredDynamicsObserver", "KalmanObserver",
+    "MomentumObserver", "Payload", "Recording", "Robot", "Run", "VftError", "admit", "compare",
+    "contacts", "estimate", "evaluate", "flange_jacobian", "identify", "inspect", "link_poses",
+    "load_robot", "read", "report", "rmse", "simulate", "thresholds",
+]  # fmt: skip
 
 
 def __dir__() -> list[str]:

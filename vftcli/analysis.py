@@ -108,14 +108,14 @@ class Analysis(Shown):
 
     @property
     def torques(self) -> tuple[ExternalTorque, ...]:
-        """The estimates, and last the reference as "reference", if there is one."""
+        """The estimates, and last the reference as "reference"."""
         if self.reference is None:
             return self.estimates
         return (*self.estimates, self.reference)
 
     @property
     def wrenches(self) -> "Several[Wrench]":
-        """One an observer, and last the reference's as "reference", if there is one."""
+        """One an observer, and last the reference's as "reference"."""
         if self.virtual_sensor is None:
             return Several()
         reference = self.virtual_sensor.reference

@@ -63,7 +63,7 @@ def errors_of(
 def free_thresholds(
     logs: OpenedLogs, choice: AnalysisChoice, rate: float
 ) -> "tuple[list[Run], list[ComparedSignals], Thresholds]":
-    """Contact-free logs, their signals, and thresholds exceeded at a rate. [1/h]"""
+    """Contact-free logs, their signals, thresholds for a rate. [1/h]"""
     from vftcli.contacts.threshold_check import compared_signals
     from vftcli.contacts.thresholds import find_thresholds
 

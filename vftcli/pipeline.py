@@ -129,7 +129,7 @@ def for_estimates(choice: AnalysisChoice) -> AnalysisChoice:
 
 
 def for_comparison(choice: AnalysisChoice) -> AnalysisChoice:
-    """A choice for errors: contacts are listed for a wrench or a score."""
+    """A choice for errors: contacts for a wrench or a score."""
     judged = choice.reference is not None and choice.reference.contacts
     return replace(choice, contacts=choice.contacts and (choice.wrench is not None or judged))
 
@@ -186,7 +186,7 @@ def check_logged(recording: Recording, why: str) -> None:
 
 
 def analyse(log: Run, choice: AnalysisChoice) -> Analysis:
-    """Estimates of a log and, if a reference is asked for, their errors."""
+    """Estimates of a log, and their errors if asked for."""
     name = log.name
     stage(f"{name}: examining", 0.05, 0.15)
     motion = read(log, choice)
@@ -393,7 +393,7 @@ def known_contacts(analysis: Analysis, choice: AnalysisChoice) -> "KnownContacts
 
 
 def judge(analysis: Analysis, choice: AnalysisChoice) -> Analysis:
-    """The analysis with errors against a reference, if one is chosen."""
+    """The analysis with errors against a reference, if any."""
     if choice.reference is None:
         return analysis
     from vftcli.evaluation import references

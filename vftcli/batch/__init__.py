@@ -70,7 +70,7 @@ class WorkersChoice(Choice):
 
     @property
     def tls(self) -> tuple[Path, ...]:
-        """Files of the authority, the own certificate and its key, or none."""
+        """Files of authority, own certificate and key, or none."""
         return tuple(path for path in (self.ca, self.cert, self.key) if path is not None)
 
     def check_closed(self, *, anyway: bool) -> None:

@@ -149,7 +149,7 @@ def estimate_episodes(choice: ForceChoice, task: EpisodesTask) -> Record:
 
 
 def check_signals(recording: Recording, *, anyway: bool) -> None:
-    """Raise without velocities or efforts, or if efforts are constant."""
+    """Raise without velocities or efforts that change."""
     if recording.dq is None:
         raise MissingSignalError(
             f"{recording.name}: no joint velocities. --set log.derive=dq makes them of positions "

@@ -21,7 +21,7 @@ class Worker(Closed, distributed.Worker):  # type: ignore[misc, unused-ignore]
 
 
 def closed_cluster(workers: int, memory: int, security: Any, silence: int) -> Any:  # noqa: ANN401
-    """Cluster of workers with `memory` [B], for the run's certificate."""
+    """Workers with `memory` [B], for the run's certificate."""
     where = {"host": "127.0.0.1", "protocol": "tls://", "security": security}
     worker = {
         "cls": distributed.Nanny,

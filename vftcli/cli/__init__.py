@@ -150,7 +150,7 @@ class Stopped(BaseException):
 
 
 def stop(number: int, _frame: FrameType | None) -> None:
-    """Unwind the command, once: a second signal stops no cleaning up."""
+    """Unwind the command, once."""
     for each in (signal.SIGINT, signal.SIGTERM):
         signal.signal(each, signal.SIG_IGN)
     STAGES.stopped = Stopped(number)

@@ -71,8 +71,7 @@ def batch(
         choice = replace(choice, reference=None)
     if narrowed := {"estimate": for_estimates, "compare": for_comparison}.get(do):
         choice = narrowed(choice)
-    # These are of each worker.
-    choice = replace(choice, library=Library(), examiner=Examiner())
+    choice = replace(choice, examiner=Examiner())  # each worker's own
     engine = asked.of(WorkersChoice)
     engine.check_closed(anyway=anyway)
     collection = LogCollection(choice.read, output)

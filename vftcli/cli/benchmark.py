@@ -93,7 +93,7 @@ def benchmark(
 def score(
     manifest: "Manifest", rivals: "list[Rival]", output: Path, asked: Asked, *, force: bool
 ) -> int:
-    """Score every log that is there and print the results; the exit code."""
+    """Score every log and print the results; the exit code."""
     from vftcli.outputs.benchmark import text_of
     from vftcli.reproduction.benchmark import BenchmarkRun
 
@@ -128,7 +128,7 @@ def score(
 
 
 def time_observers(robot: str, asked: BenchChoice, form: str) -> None:
-    """Print the times of the dynamics and each observer on this machine."""
+    """Print the times of dynamics and observers."""
     from vftcli.outputs import grid
     from vftcli.outputs.grids import bench_grid
     from vftcli.reproduction.timing import benchmark as measured

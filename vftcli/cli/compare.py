@@ -46,7 +46,7 @@ def print_errors(
     *,
     details: bool,
 ) -> None:
-    """Print the errors in the form asked for; in details pairs of observers below."""
+    """Print the errors in a form; in details pairs of observers too."""
     import polars as pl
 
     from vftcli.evaluation.errors import POOLED

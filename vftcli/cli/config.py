@@ -176,7 +176,7 @@ def every_command() -> Mapping[str, Click]:
 
 
 def choices_of(*commands: Click) -> tuple[type[Choice], ...]:
-    """The choices with the settings of some commands, each once."""
+    """The choices of some commands, each once."""
     each = (kind for command in commands for kind in vars(command.callback)["choices"])
     return tuple(dict.fromkeys(each))
 
@@ -210,7 +210,7 @@ def value_of(ctx: Click, option: Click, key: str, value: object, path: Path) -> 
 
 
 def words_in(value: object) -> Iterator[str]:
-    """The words that would be typed for a value; none of another kind."""
+    """The words that would be typed for a value."""
     for word in value if isinstance(value, list | tuple) else [value]:
         if isinstance(word, bool) or not isinstance(word, str | int | float):
             return

@@ -77,7 +77,7 @@ def show(text: str) -> None:
 
 
 def echo_top(text: str) -> None:
-    """Print a result to stdout; without --details what fits beside the words."""
+    """Print a result to stdout; without --details what fits."""
     from vftcli.outputs.screen import FILE_LINES, MOST_LINES
 
     lines = text.rstrip("\n").split("\n")
@@ -89,7 +89,7 @@ def echo_top(text: str) -> None:
 def say_written(
     record: str, folder: Path, names: Sequence[str], *, json: bool, several: bool = False
 ) -> None:
-    """Print the written files and the page to open, or `run.json`."""
+    """Print the written files and the page, or `run.json`."""
     from vftcli.outputs.screen import written_lines
 
     if (several or "recording.rrd" in names) and not installed("rerun"):
@@ -101,7 +101,7 @@ def say_written(
 
 
 def open_made(path: Path) -> None:
-    """Open a page, a folder's page or its recording, and say so."""
+    """Open a page, or a folder's page or recording, and say so."""
     page, recording = path, path / "recording.rrd"
     if path.is_dir():
         page = path / "index.html"
@@ -149,7 +149,7 @@ def say_json(
 
 
 class LeftOut:
-    """The logs that a command cannot analyse, one line each; the others go on."""
+    """The logs that a command cannot analyse, one line each."""
 
     def __init__(self, library: "Library", logs: Sequence[Path]) -> None:
         self._library, self._several = library, len(logs) > 1
@@ -237,7 +237,7 @@ def say_analysis(analysis: "Analysis") -> None:
 
 
 def say_remarks(remarks: "Iterable[Remark]") -> None:
-    """Print remarks that can make a result wrong; in details the rest."""
+    """Print warnings; in details all remarks."""
     for remark in remarks:
         if remark.level == "warning":
             say(f"warning: {remark}")

@@ -133,7 +133,7 @@ def contact_thresholds(
 
 
 def settled_reference(recording: "Recording") -> "ReferenceChoice | None":
-    """Default source of contacts: truth beside the log, or sensor."""
+    """Default source of contacts: truth, or sensor."""
     truth = Path(f"{recording.source.path}.truth.parquet")
     if truth.exists():
         return ReferenceChoice(name=f"{FILE}{truth}")

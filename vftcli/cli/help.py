@@ -267,7 +267,7 @@ def formats(name: str | None) -> Iterator[str]:
 
 
 def settings() -> Iterator[str]:
-    """Every setting of all commands: name, unit, meaning and default."""
+    """Every setting: name, unit, meaning and default."""
     choices = choices_of(*every_command().values())
     rows, each = [], (settings_by_name([kind]).items() for kind in choices)
     for name, (option, default) in chain(*each):

@@ -200,7 +200,7 @@ EMPTY = inspect.Parameter.empty
 
 
 def parameter(name: str, what: Any, option: Option, default: object = EMPTY) -> inspect.Parameter:  # noqa: ANN401
-    """An option or argument for typer, with a default if it may be missing."""
+    """An option or argument for typer."""
     if default is EMPTY and (not option.metavar or NoneType in get_args(what)):
         default = None if option.metavar else False
     how: dict[str, Any] = {"help": option.help, "min": option.least, "max": option.most}
@@ -279,7 +279,7 @@ def choice_for(
     on_screen: bool = False,
     observers: ObserverChoice | None = None,
 ) -> "AnalysisChoice":
-    """The choice of a command, with an examiner that prints logs' health."""
+    """The choice of a command, whose examiner prints."""
     from vftcli.pipeline import choice_of
 
     if "observer" in asked.words:

@@ -96,7 +96,7 @@ def comparison_grid(rows: Sequence[Record], title: str = "") -> Grid:
 
 
 def latency_rows(run: ClosedLoop) -> list[Record]:
-    """A closed loop's latencies as rows, None for what did not happen."""
+    """A closed loop's latencies as rows, None for none."""
     return [
         {
             "axis": AXES[entry.axis],
@@ -301,7 +301,7 @@ def render_admittance(found: Replayed, record: Record, title: str) -> str:
 
 
 def painted(replay: Replay) -> list[tuple[Controller, str]]:
-    """Every controller with its colour; the traditional one's is ink."""
+    """Every controller with its colour; the traditional is ink."""
     spare = iter(SPARE * len(replay.controllers))
     return [(c, next(spare) if c.kind == "variable" else "ink") for c in replay.controllers]
 
@@ -346,7 +346,7 @@ def padded(values: Array) -> Array:
 
 
 def replay_figures(replay: Replay, run: ClosedLoop | None = None) -> dict[str, Drawing]:
-    """Force and deviation along dragged axes; none if nothing moved."""
+    """Force and deviation along dragged axes, if any."""
     moved = [k for k in range(len(AXES)) if np.nanmax(np.abs(replay.motion.x[:, :, k])) > 0.0]
     dragged = {row["axis"] for row in replay.rows}
     shown = [k for k in moved if AXES[k] in dragged] or moved

@@ -59,7 +59,7 @@ class BatchFolder:
 
     @contextmanager
     def opened(self, options: str, record: Record, *, force: bool) -> Iterator[None]:
-        """Make or resume the folder for a block, held against other runs."""
+        """Make or resume the folder, held for a block."""
         with writing(self.path):
             check_letters(self.path)
             self._check(options, force=force)

@@ -112,7 +112,7 @@ class Results:
         )
 
     def pooled(self, key: str) -> Iterator[tuple[Record, Score]]:
-        """Place and score of pooled logs: torques by "joint", wrenches by "axis"."""
+        """Place and score of pooled logs, by "joint" or "axis"."""
         for _, own in self.table.drop_nulls(key).group_by(*PLACE, maintain_order=True):
             sums = own.group_by(key, maintain_order=True).agg(pl.col(*Score._fields).explode())
             yield own.select(*FACTS).row(0, named=True), Score.pooled(sums.to_dicts())
@@ -143,7 +143,7 @@ class Results:
         return pooled.partition_by("protocol", "method", maintain_order=True)
 
     def headline(self) -> Grid:
-        """Skill in contact and L1 in free motion, by method and protocol."""
+        """Skill in contact, L1 in free motion, by method and protocol."""
         columns, means = list[Column | str](["method"]), list[dict[str, float]]()
         for (part, (key, column)), protocol in product(HEADLINE.items(), self.protocols):
             own = self.spoken.filter(part=part, protocol=protocol)
@@ -226,7 +226,7 @@ def seen(rows: pl.DataFrame, key: str) -> list[str]:
 
 
 def arm_texts(rows: Sequence[Record]) -> list[Record]:
-    """A table's rows as texts, marked where the truth's error is larger."""
+    """A table's rows as texts, some marked `NEAR`."""
     least = min((row["rmse_Nm"] for row in rows if row["method"] != "zero"), default=0.0)
     error = max(row["truth_error_Nm"] for row in rows)
     found = []

@@ -120,14 +120,14 @@ class Chart(NamedTuple):
 
 
 def colours_of_names(names: Sequence[str]) -> dict[str, str]:
-    """A colour for each estimate's name, shared only if none is left."""
+    """A colour for each estimate's name."""
     own = {COLOURS.get(name) for name in names}
     spare = cycle([colour for colour in SPARE if colour not in own] or SPARE)
     return {name: COLOURS.get(name) or next(spare) for name in names}
 
 
 def lines_of_names(names: Sequence[str]) -> dict[str, LineStyle]:
-    """Colour and dash of every name: the first has a line without gaps."""
+    """Colour and dash of every name."""
     colours = colours_of_names(names).items()
     return {name: (colour, DASHES[k % len(DASHES)]) for k, (name, colour) in enumerate(colours)}
 
@@ -209,7 +209,7 @@ def even_starts(samples: int, stretches: int) -> Index:
 
 
 def extremes(lines: Sequence[Array], starts: Index) -> Index:
-    """Lowest and highest known sample of lines (T,) a stretch, else its first."""
+    """Lowest, highest known sample of lines (T,) a stretch, or its first."""
     stops, kept = np.append(starts[1:], len(lines[0])), list[Index]()
     at = np.minimum(starts[:, None] + np.arange(max(stops - starts)), stops[:, None] - 1)
     for line in lines:

@@ -251,7 +251,7 @@ def hardest_rows(contacts: Sequence[Contact], most: int = MOST_ROWS) -> list[Con
 
 
 def contact_grid(contacts: Sequence[Contact]) -> Grid:
-    """The table of contacts; joint torques where no force is known."""
+    """The table of contacts; joint torques without forces."""
     known = any(contact.peak_force is not None for contact in contacts)
     size = (Column("|F|", "N", symbol="$|F|$"), Column("range", "N"), "direction")
     columns = (

@@ -101,7 +101,7 @@ def wrench_topic(name: str, frame: str, values: Array) -> OutputTopic:
 
 
 def events(analysis: Analysis, start: int) -> list[Event]:
-    """Messages at begin and end of contacts in a log from `start`. [ns]"""
+    """Messages at begin and end of contacts; log from `start`. [ns]"""
     made = list[Event]()
     for contact in analysis.listed:
         level = WARNING if contact.trust == "weak" else INFO
@@ -115,7 +115,7 @@ def events(analysis: Analysis, start: int) -> list[Event]:
 
 
 def ros_name(name: str) -> str:
-    """A name as ROS allows it: letters, digits and underscores."""
+    """A name as ROS allows it."""
     return "".join(letter if letter.isascii() and letter.isalnum() else "_" for letter in name)
 
 
@@ -183,7 +183,7 @@ def convert(recording: Recording, path: Path, *, force: bool = False) -> None:
 
 
 def check_conversion(path: Path, force: bool) -> None:
-    """Raise an OutputError if a log could not be written to `path`."""
+    """Raise an OutputError if no log can be written to `path`."""
     if path.suffix.lower() not in WRITERS:
         raise OutputError(
             f"{path}: no format ends in {path.suffix or 'nothing'!r}; there is {', '.join(WRITERS)}"

@@ -62,7 +62,7 @@ class Block(NamedTuple):
 
     @property
     def at_floor(self) -> Mask:
-        """Where an error may be the reference's own. (observers, joints)"""
+        """Where errors may be the reference's. (observers, joints)"""
         return self.rmse <= AT_FLOOR * self.floor
 
     @property
@@ -92,7 +92,7 @@ class Block(NamedTuple):
 
     @property
     def joint_heads(self) -> list[str]:
-        """J1, J2, …; a dagger where the reference is not to be trusted."""
+        """J1, J2, …; a dagger where not to trust the reference."""
         return [f"J{j}{DAGGER if j in self.untrusted else ''}" for j in self.joints]
 
 
@@ -258,7 +258,7 @@ def compared_samples(rows: pl.DataFrame) -> int:
 
 
 def nothing_to_compare(errors: pl.DataFrame) -> Iterator[str]:
-    """A line for each log and reference without a common wrench sample."""
+    """A line for each log without a common wrench sample."""
     for rows in logs_of(errors, "axis"):
         if not compared_samples(rows):
             yield (

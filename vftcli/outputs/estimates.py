@@ -63,7 +63,7 @@ def columns(analysis: Analysis, rows: slice) -> Iterator[tuple[str, Array]]:
 
 
 def wrench_columns(analysis: Analysis, rows: slice) -> Iterator[tuple[str, Array]]:
-    """Columns of wrenches: values, deviations, null space, sigma_min."""
+    """Columns of wrenches, null space and sigma_min."""
     sensed = analysis.virtual_sensor
     bounded = sensed is not None and sensed.sensor.solver != "pinv"
     for wrench in analysis.wrenches:
@@ -148,7 +148,7 @@ SUMMARY_FILES = ("index.html", SEAL, *CONTACTS, *ERROR_TABLES)
 
 
 def places_of(labels: Iterable[str]) -> list[str]:
-    """The sub-folder of each log: its file's name without the ending."""
+    """The sub-folder of each log: its name without the ending."""
     return numbered(Path(label).stem or "log" for label in labels)
 
 

@@ -111,7 +111,7 @@ def warnings_of(examination: Examination) -> tuple[Remark, ...]:
 
 
 def examinations_text(examinations: Sequence[Examination], most: float) -> str:
-    """Texts of some logs; a line each if they have more lines than `most`."""
+    """Texts of logs; a line each if they have over `most` lines."""
     text = "\n\n".join(map(examination_text, examinations))
     if len(examinations) == 1 or text.count("\n") < most:
         return text

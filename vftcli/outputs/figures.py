@@ -176,7 +176,7 @@ def numbers_of(contacts: Iterable[Contact]) -> dict[int, float]:
 
 
 def error_figures(errors: pl.DataFrame) -> dict[str, Drawing]:
-    """RMSE with its interval by joint, a plot a log; of many pooled."""
+    """RMSE with its interval by joint, a plot a log, or pooled."""
     groups = list(logs_of(errors, "joint"))
     if len(groups) > MOST:
         groups = [rows for rows in groups if rows["recording"][0] == POOLED]
@@ -233,7 +233,7 @@ def spectra_drawing(spectra: Spectra, observers: Mapping[str, Observer]) -> Draw
 def tuning_drawing(
     curves: "Mapping[str, Curve]", chosen: "Mapping[str, tuple[Array, Array]]"
 ) -> Drawing:
-    """Expected error over frequency; chosen rates [rad/s], errors [N·m]."""
+    """Expected error over frequency, chosen rates [rad/s]."""
     styles = lines_of_names(list(curves))
     lines = [
         ChartLine(name, curve.rmse, *styles[name], x=curve.omega_n / (2.0 * np.pi))

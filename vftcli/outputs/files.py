@@ -66,7 +66,7 @@ def atomic(path: Path, force: bool = False) -> Iterator[Path]:
         to_disk([target.parent])
 
 
-def check_file(path: Path, force: bool = False) -> None:
+def check_file(path: Path, force: bool) -> None:
     """Raise an OutputError if a file could not be written."""
     with writing(path):
         check_letters(path)
@@ -93,7 +93,7 @@ def put_table(
     frames: Mapping[str, StatedFrame] | None = None,
     **how: Any,  # noqa: ANN401 - of `write_parquet`
 ) -> None:
-    """Write a table as Parquet, with the meaning of each column."""
+    """Write a table as Parquet, with each column's meaning."""
     schema = described_schema(table, frames)
     with table_file(path) as file:
         table.write_parquet(file, compression="zstd", arrow_schema=schema, **how)

@@ -42,7 +42,7 @@ def minus(text: str) -> str:
 
 
 def signed(value: float) -> str:
-    """Three significant digits with a true minus sign, for the page."""
+    """Three significant digits with a true minus sign."""
     return minus(significant(value))
 
 

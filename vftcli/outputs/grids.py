@@ -115,7 +115,7 @@ def robot_text(robot: "Robot") -> str:
 
 
 def bench_grid(result: Record) -> Grid:
-    """Times of dynamics and observers, beside the paper's on its laptop."""
+    """Times of dynamics and observers, beside the paper's."""
     dynamics = {"name": "dynamics", **result["dynamics"]}
     columns = {
         "name": "",
@@ -127,7 +127,7 @@ def bench_grid(result: Record) -> Grid:
 
 
 def contact_grids(errors: "pl.DataFrame | None") -> Iterator[Grid]:
-    """Contact detection by recording and observer, if asked for."""
+    """Contact detection by recording and observer, if any."""
     if errors is None or "contacts" not in errors.columns:
         return
     if len(rows := errors.drop_nulls("contacts")):
@@ -136,7 +136,7 @@ def contact_grids(errors: "pl.DataFrame | None") -> Iterator[Grid]:
 
 
 def drift_grid(drifts: "Iterable[Drift]") -> Grid:
-    """Zero drift per observer and axis, with the decimals of the paper."""
+    """Zero drift by observer and axis, in the paper's decimals."""
     axes = (Column(axis, unit_of(axis), ".5f") for axis in AXES)
     rows: Rows = [(d.name, f"{d.span[0]:g}–{d.span[1]:g}", *map(float, d.mean)) for d in drifts]
     title = "Zero drift; the first span's is removed"

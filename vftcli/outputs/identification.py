@@ -176,13 +176,13 @@ def velocity_plot(
 
 
 def shown_trace(found: Identification) -> Trace:
-    """The log drawn over time: the first held-out one, else the first."""
+    """The log drawn over time: the first held out, else the first."""
     # A log outside the fit shows how well it predicts.
     return next((t for t in found.traces if t.role == "held-out"), found.traces[0])
 
 
 def torque_charts(found: Identification) -> tuple[Chart, ...]:
-    """Measured and predicted torque of one log, and their difference."""
+    """Measured and predicted torque of one log, and the rest."""
     if not found.traces:
         return ()
     trace, units = shown_trace(found), ("N·m",) * found.robot.joints

@@ -101,7 +101,7 @@ class Drawing(NamedTuple):
 
 
 def figure_files(form: str | None, names: Sequence[str], before: str = "figures/") -> list[str]:
-    """The files of these figures in both widths; none without a form."""
+    """The files of these figures in both widths."""
     each = product(names, WIDTHS) if form else ()
     return [f"{before}{name}-{width}.{form}" for name, width in each]
 
@@ -109,7 +109,7 @@ def figure_files(form: str | None, names: Sequence[str], before: str = "figures/
 def write_figures(
     folder: OutputFolder, drawings: Mapping[str, Drawing], form: str, before: str = "figures/"
 ) -> None:
-    """Write figures in both widths, without date, for equal bytes."""
+    """Write figures in both widths, in equal bytes."""
     maker = f"vftcli {VERSION}"
     own: dict[str, dict[str, str | None]] = {
         "pdf": {"Creator": maker, "CreationDate": None},

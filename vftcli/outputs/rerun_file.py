@@ -70,7 +70,7 @@ def motion(chain: Chain, t: Array, q: Array) -> ArmPoses:
 
 
 def xyzw(rotation: Array) -> Array:
-    """Unit quaternions of rotation matrices, the scalar last. (…, 4)"""
+    """Quaternions of rotation matrices, the scalar last. (…, 4)"""
     return np.roll(matrix_quaternion(rotation), -1, axis=-1)
 
 

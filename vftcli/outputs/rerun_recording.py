@@ -86,7 +86,7 @@ def write_rrd(path: Path, analysis: Analysis, detail: str = LEVELS) -> None:
 
 
 def tabs_of(analysis: Analysis, detail: str) -> list[Tab]:
-    """All plots; of a long log `STRETCHES`, whole where contacts begin."""
+    """All plots; those of a long log thinned."""
     hardest = sorted(analysis.listed, key=lambda c: -(c.peak_force or 0.0))
     strongest, tabs = hardest[: int(0.5 * WHOLE_TIME / AROUND)], []
     whole = [(c.start - AROUND, c.start + AROUND) for c in strongest]

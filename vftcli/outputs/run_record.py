@@ -132,7 +132,7 @@ def seal(
 
 
 def to_json(record: Record | Sequence[Any]) -> str:
-    """A record, or rows, as JSON; null for numbers that are not finite."""
+    """A record, or rows, as JSON; null if not finite."""
     text = json.dumps(jsonable(record), indent=2, ensure_ascii=False, allow_nan=False)
     return NUMBERS.sub(lambda found: " ".join(found.group().split()), text) + "\n"
 
@@ -187,7 +187,7 @@ def log_remarks(logs: Iterable[Recording]) -> dict[str, list[Remark]]:
 
 
 def robot_record(robot: Robot) -> Record:
-    """The robot in use: a built-in profile by its name, not its path."""
+    """The robot in use: a built-in profile by its name."""
     # Its path differs between machines; name and digest are enough.
     path, built_in = robot.path, robot.path in PROFILES.values()
     return {
@@ -214,7 +214,7 @@ def observer_record(observer: Observer, tuning: Tuning | None) -> Record:
 
 
 def refinement_record(analysis: Analysis) -> Record | None:
-    """Free part, chosen gains, bias and error budget of the complete log."""
+    """Free part, gains, bias, error budget of the complete log."""
     found = analysis.refinement
     if found is None:
         return None

@@ -82,7 +82,7 @@ class Canvas(NamedTuple):
         return text.translate(PLAIN).encode("ascii", "replace").decode()
 
     def wrapped(self, text: str, indent: int, lines: int | None = None) -> list[str]:
-        """A text in at most `lines` lines, with an indent from the second."""
+        """A text in at most `lines` lines, with a hanging indent."""
         found = textwrap.wrap(
             text,
             self.width - indent,
@@ -213,7 +213,7 @@ def belief_lines(found: Sequence[Ground], canvas: Canvas, most: int | None) -> l
 def ground_lines(
     ground: Ground, canvas: Canvas, most: int | None, about: str = ""
 ) -> Iterator[str]:
-    """Lines of one ground: mark, subject, sentence; then its remedy."""
+    """Lines of one ground, then its remedy."""
     subject, indent = f"{about}: {ground.subject}" if about else ground.subject, SUBJECT + 5
     first, *more = canvas.wrapped(printable(ground.sentence), indent, most)
     mark = canvas.painted(canvas.shown(MARKS[ground.standing]), ground.standing)
@@ -332,7 +332,7 @@ def force_bars(t: Array, force: Array, contacts: Sequence[Contact], canvas: Canv
 
 
 def column_peaks(t: Array, force: Array, columns: int) -> Array:
-    """The largest |F| in each of equal spans of time. (columns,) [N]"""
+    """The largest |F| in equal spans of time. (columns,) [N]"""
     edges = np.linspace(t[0], t[-1], columns + 1)
     # A span without a sample is interpolated.
     peaks = np.interp(0.5 * (edges[1:] + edges[:-1]), t, force)

@@ -22,7 +22,7 @@ FLAT = 1e-3  #: Along directions that bend less, of the most, a corner stays in 
 
 
 class Capsule(NamedTuple):
-    """A cylinder with round ends, in the axes of the frame it moves with."""
+    """A cylinder with round ends, in its frame's axes."""
 
     start: Array  #: Centre of one end. (3,) [m]
     direction: Array  #: From one end's centre to the other's. (3,) [m]

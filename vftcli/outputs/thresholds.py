@@ -42,7 +42,7 @@ CONTACTS = {
 def thresholds_text(
     thresholds: Thresholds, counted: Sequence[CountedAlarms], checks: Sequence[ThresholdDetection]
 ) -> str:
-    """Tables of thresholds and calls of interfaces, for the terminal."""
+    """Tables of thresholds, calls of interfaces, for the terminal."""
     parts = [terminal(thresholds_grid(thresholds)) + LEGEND]
     if counted:
         joints = joint_columns(len(counted[0].joints))
@@ -194,7 +194,7 @@ def franka_text(
 
 
 def ur_script(thresholds: Thresholds) -> str:
-    """A thread in URScript that halts at a force beyond the limit."""
+    """A thread in URScript that halts beyond the limit."""
     own = thresholds.logged_wrench
     head = "" if own else "# learned from gmo, not from actual_TCP_force: record that\n"
     return f"""{head}thread watch_force():

@@ -222,7 +222,7 @@ class BenchmarkRun:
 
 
 def write_log(log: BenchmarkLog, base: BenchmarkLog, command: str, path: Path) -> None:
-    """Write the log of an entry, with its truth: pushed, simulated, of files."""
+    """Write an entry's log, with its truth."""
     if log.pushes:
         choice = replace(base.choice(), examiner=Examiner(anyway=True))
         read = choice.library.open(base.paths[0], replace(choice.read, derive="none"))

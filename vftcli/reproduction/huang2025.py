@@ -172,7 +172,7 @@ def mean_of(wrench: Wrench, span: Sequence[float]) -> Array:
 
 
 def weights(variant: str, drift: Array, hung: Array) -> Iterator[Given]:
-    """Zero drift, and the bearing's weight before and after; down is +."""
+    """Zero drift, and the bearing's weight; down is +."""
     for axis, value in zip(AXES, drift, strict=True):
         yield variant, f"drift/{axis}", value
     yield variant, "weight/raw", -hung[2]
@@ -180,7 +180,7 @@ def weights(variant: str, drift: Array, hung: Array) -> Iterator[Given]:
 
 
 def replay_bearing(wrench: Wrench, made: Analysis, control: ControlChoice) -> Replay:
-    """One force through Table IV's traditional and variable controllers."""
+    """One force through Table IV's controllers."""
     robot, source = made.robot, fact("force-of-observer", observer=wrench.name)
     return replay(wrench, made.recording.q, robot, control.controllers(robot), source=source)
 
@@ -239,7 +239,7 @@ def tapped_circle(seed: int, *, scenario: str, period: float) -> Iterator[Given]
 def closed_loop(
     seed: int, *, scenario: str, figures: Sequence[str], alphas: Sequence[float]
 ) -> Iterator[Given]:
-    """Latencies of a controller in the loop; its force replayed with every α."""
+    """Latencies in the loop; its force replayed with every α."""
     for variant, observers in OBSERVERS.items():
         control = ControlChoice(as_printed=variant == AS_PRINTED)
         run, arm = loop_of(scenario, control, observers, seed=seed)

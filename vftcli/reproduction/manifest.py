@@ -142,7 +142,7 @@ class BenchmarkLog:
         return [word for word in self.free if ":" not in word]
 
     def choice(self, **words: object) -> AnalysisChoice:
-        """Choices of its analysis: its entry's options, then these words."""
+        """Choices of its analysis: its options, then these words."""
         own = {"frame": "base", "wrench": True, **dict(self.options), **words}
         made = choice_of(Asked(own, {}, ""), Library(), Examiner())
         return cast("AnalysisChoice", with_files(made, absolute))

@@ -226,7 +226,7 @@ def rows_of(answer: Answer, truth: KnownTruth, log: BenchmarkLog) -> Iterator[Re
 def torque_rows(
     torque: ExternalTorque, truth: Array, parts: Mapping[str, Mask]
 ) -> Iterator[Record]:
-    """Rows of a torque: sums by part and joint, shifts, the worst span."""
+    """Rows of a torque: sums, shifts, the worst span."""
     for part, inside in parts.items():
         if inside.any():
             score = Score.of(torque.t, torque.tau, truth, inside, torque.error_sd)
@@ -258,7 +258,7 @@ def worst_of(torque: ExternalTorque, truth: Array, scored: Mask) -> Record:
 
 
 def weighed(up: Array, weight: float, w: Array) -> Record:
-    """Mean and rms error of a carried weight [N], share of answered time."""
+    """Mean and rms error of a weight [N], share of answered time."""
     known = np.isfinite(up)
     total = float(w[known].sum()) or np.nan
     mean, square = (float((w * x)[known].sum()) / total for x in (up, (up - weight) ** 2))

@@ -91,7 +91,7 @@ class PageClock:
         return self.blob.add(values[self.samples], LARGEST["rad"])
 
     def ends(self, values: Array, unit: str, every: int = 1) -> tuple[int, int | None]:
-        """Rows of each stretch's lowest value, and of the highest above it. (T,)"""
+        """Rows of each stretch's lowest value, and the highest above. (T,)"""
         step, add = step_of(values, unit), self.blob.add
         if self.whole:
             return add(values, step), None
@@ -128,7 +128,7 @@ class PageClock:
 
 
 def step_of(values: Array, unit: str) -> float:
-    """Step of a series: its unit's, less for small values, 0 without one."""
+    """Step of a series: its unit's, less for small values."""
     return min(LARGEST.get(unit, 0.0), largest(values) / FEWEST)
 
 

@@ -124,7 +124,7 @@ def render(analysis: Analysis, sizes: Mapping[str, int | None] = {}) -> str:
 
 
 def lead_sentences(analysis: Analysis) -> list[str]:
-    """Sentences on touched places, uncertain rows and hidden forces."""
+    """Sentences on places, uncertain rows and hidden forces."""
     found = analysis.contacts
     if found is None:
         unlisted = [r for r in analysis.remarks if r.code == "contacts-not-listed"]
@@ -245,7 +245,7 @@ def render_logs(
     analyses: Sequence[Analysis] = (),
     below: str = "",
 ) -> str:
-    """The page of several logs: a report's with `analyses`, or a batch's."""
+    """The page of several logs: with `analyses`, or a batch's."""
     title, lead = logs_headline(lines)
     robots = dict.fromkeys(line.robot for line in lines)
     each = zip(lines, analyses, strict=False)

@@ -58,7 +58,7 @@ def templates() -> "Environment":
     from markupsafe import Markup
 
     class Kept(FileSystemBytecodeCache):
-        """Compiled templates beside their texts, like Python's modules."""
+        """Compiled templates beside their texts."""
 
         def dump_bytecode(self, bucket: Bucket) -> None:
             """Keep one if the package's folder can be written."""
@@ -248,7 +248,7 @@ def tenth(number: int) -> str:
 
 
 def ribbon(scales: Scales, t: Array, low: Array, high: Array) -> str:
-    """The area between two lines as a path, broken at unknown values."""
+    """The area between two lines as an SVG path."""
     above, below = (
         np.column_stack([scales.across(t), scales.near(edge)]) for edge in (high, low)
     )

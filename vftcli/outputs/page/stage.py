@@ -43,7 +43,7 @@ class View(NamedTuple):
     reach: float  #: Largest distance of the flange from the base. [m]
 
     def seen(self, points: Array) -> Array:
-        """Points of the still drawing, depth, and units of 1 m there. (K, 4)"""
+        """Points of the still drawing, depth, units of 1 m. (K, 4)"""
         across, up, ahead = axes_of(self.yaw, self.pitch)
         moved, scale = points - self.centre, min(WIDTH / self.span[0], HEIGHT / self.span[1])
         near = FILLED * scale * self.nearness(points)
@@ -211,7 +211,7 @@ def stage_data(
 
 
 def contact_words(contact: Contact) -> str:
-    """A contact's name, place, direction, and a wide cone's angle."""
+    """A contact's name, place, direction, a wide cone's angle."""
     said = [contact_name(contact), place_words(contact)]
     if contact.wrench is not None:
         cone = cone_of(contact)
