@@ -85,8 +85,7 @@ class ReadChoice(Choice):
         Option("log.format", "NAME", "Read the log as this format; default: by its content."),
     ] = None
     columns: Annotated[
-        str | None,
-        Option("--columns", "SPEC", "Name a table's columns (help columns)."),
+        str | None, Option("--columns", "SPEC", "Name a table's columns (help columns).")
     ] = None
     #: The span that is used, from the first sample, None for all of it. [s]
     interval: Annotated[

@@ -1,4 +1,4 @@
-"""Robots: the built-in profiles, the loaders of users' own files, the user's choice."""
+"""Robots: built-in profiles, loaders of users' files, the user's choice."""
 
 import re
 from dataclasses import replace
@@ -42,14 +42,14 @@ def model_of(name: str) -> str:
 
 @cache
 def built_in(path: Path) -> "Robot":
-    """The robot of a built-in profile, made once: it does not change."""
+    """The robot of a built-in profile, made once."""
     from vftcli.robots.profile import load_profile
 
     return load_profile(path)
 
 
 def profiles_of(joints: int) -> list[str]:
-    """The built-in profiles of arms with so many joints; no file is read."""
+    """The built-in profiles of arms with so many joints."""
     return [name for name in PROFILES if NAMES[name] == joints]
 
 
@@ -126,8 +126,7 @@ class RobotChoice(Choice):
         ),
     ] = "profile"
     payload: Annotated[
-        str | None,
-        Option("--payload", "NAME", "Mount this payload of the robot file."),
+        str | None, Option("--payload", "NAME", "Mount this payload of the robot file.")
     ] = None
     tip: Annotated[str, Option("--tip", "FRAME", "End the arm at this link or joint.")] = ""
 

@@ -235,7 +235,7 @@ def link_poses(chain: Chain, q: Array) -> Pose:
     check_kind(chain, Chain, "the chain", "robot.chain")
     check_shape(q, ("T", chain.joints), "q", "the poses")
     samples, n = np.shape(q)
-    # Time is the last axis: every entry of a matrix is one row of the memory.
+    # Time is the last axis: an entry is a row of memory.
     rotation, translation = np.empty((n + 1, 3, 3, samples)), np.empty((n + 1, 3, samples))
     turns = np.concatenate([chain.rotation, chain.flange_rotation[None]])
     shifts = np.vstack([chain.translation, chain.flange_translation])

@@ -25,13 +25,7 @@ from vftcli.robots.kernels import chain_parameters, momentum_terms, torque_regre
 from vftcli.robots.meshes import meshes_of, packages_near
 from vftcli.robots.profile import assemble, column
 from vftcli.robots.robot import JointFriction, Limits, Robot
-from vftcli.robots.robot_file import (
-    DESCRIPTIONS,
-    RobotFile,
-    Section,
-    robot_text,
-    weightless,
-)
+from vftcli.robots.robot_file import DESCRIPTIONS, RobotFile, Section, robot_text, weightless
 from vftcli.robots.urdf import mjcf_tree, urdf_tree
 from vftcli.signals.errors import RobotError
 from vftcli.signals.packages import needed

@@ -260,7 +260,7 @@ def falling_speed(friction: JointFriction, limit: float) -> float:
     # Beside rest a Coulomb torque pushes; 500 steps see a turn to .2 %.
     dq = np.linspace(-limit, limit, 1001)
     torque = steady_torque(friction, dq)
-    # A hundred-thousandth of the torque is rounding, at a sigmoid's flat ends too.
+    # A hundred-thousandth of the torque is rounding.
     falls = np.diff(torque) < -1e-5 * abs(torque).max()
     ends = np.minimum(abs(dq[:-1]), abs(dq[1:]))
     return float(ends[falls].min()) if falls.any() else float("nan")
@@ -295,7 +295,7 @@ def dry_torque(joint: JointFriction, load: Array | float = 0.0) -> Array:
     """
     known = joint.parameters
     coulomb = sum(known.get(key, 0.0) for key in ("coulomb", "stribeck", "presliding"))
-    # A sigmoid runs from one saturation to the other, which lie one amplitude apart.
+    # A sigmoid's saturations lie one amplitude apart.
     coulomb += 0.5 * abs(known.get("amplitude", 0.0)) + sum(joint.torques[:1])
     return coulomb + known.get("load_coulomb", 0.0) * np.abs(load)
 
@@ -367,7 +367,7 @@ def follow(low: Array, high: Array, start: Array) -> Array:
 
 
 def clipped(value: Array, low: Array, high: Array) -> Array:
-    """`numpy.clip` without its checks, which cost more than a row of a block."""
+    """`numpy.clip` without its checks, which cost more than a row."""
     return np.minimum(np.maximum(value, low), high)
 
 
@@ -393,11 +393,7 @@ class RunningFriction:
         self._length = np.array(lengths)
 
     def torque(
-        self,
-        q: Array,
-        dq: Array,
-        load: Array | None = None,
-        temperature: Array | None = None,
+        self, q: Array, dq: Array, load: Array | None = None, temperature: Array | None = None
     ) -> Array:
         """Friction torque of the next samples. (T, n) [N·m]"""
         state = None

@@ -71,7 +71,7 @@ def named(link: UrdfPart, tag: str, packages: Mapping[str, str]) -> Iterator[Mes
                 pose = link.origin(shape)
                 if "scale" in element.attrib:
                     scale = link.bounded(geometry, "mesh", "scale", 3, "xyz")
-            except RobotError:  # what an arm looks like is no reason to refuse it
+            except RobotError:  # looks are no reason to refuse it
                 file = None
             yield Mesh(name, file, 0, pose, np.array(scale))
 

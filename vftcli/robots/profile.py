@@ -148,7 +148,7 @@ def checked_body(table: Section, default: Sequence[float] | None = None) -> Body
 
 
 def torque_constants(joints: Sequence[Section], source: str) -> Array | None:
-    """The drive constants, or None where no joint has one and none is needed."""
+    """The drive constants, None where none are and none is needed."""
     missing = [joint for joint in joints if "torque_constant" not in joint.values]
     if len(missing) == len(joints) and source != "current":
         return None
@@ -210,7 +210,7 @@ def points(section: Section) -> dict[str, tuple[float, ...]]:
 
 
 def checked_gains(section: Section) -> dict[str, Mapping[str, Any]]:
-    """The ``[observers.*]`` tables: values are numbers, lists of them, or words."""
+    """The ``[observers.*]`` tables of numbers, lists of them, and words."""
     for own in map(section.section, section.values):
         for key, value in own.values.items():
             own.value(key, TEXT if isinstance(value, str) else PER_JOINT)
@@ -302,7 +302,7 @@ def robot_document(robot: Robot) -> Table:
 
 
 def kept_or_new(old: Table, payload: Payload) -> Table:
-    """The file's own section if its mass is the same, else a new one in flange axes."""
+    """The file's own section of equal mass, else one in flange axes."""
     if old.get("mass") == payload.mass:
         return {key: value for key, value in old.items() if not is_table(value)}
     tensor = payload.inertia[np.triu_indices(3)].tolist()

@@ -39,7 +39,7 @@ class JointFriction(Shown):
     model: str = "none"  #: A name in `vftcli.robots.friction.FRICTION_MODELS`, or "none".
     #: Numbers by key, in SI units; `presliding` and `presliding_length` both or neither.
     parameters: Mapping[str, float] = field(default_factory=dict)
-    speeds: tuple[float, ...] = ()  #: Speeds of the model "points", rising. [rad/s]
+    speeds: tuple[float, ...] = ()  #: Of the model "points", rising. [rad/s]
     torques: tuple[float, ...] = ()  #: Friction at these speeds. [N·m]
     #: p₁ to p₄ of the temperature law (`vftcli.robots.friction`), or empty.
     temperature: tuple[float, ...] = ()
@@ -138,9 +138,9 @@ class Robot(Shown):
     sensors: Mapping[str, Pose] = field(default_factory=dict)
     #: The parameters of ``[admittance]``, as the file has them.
     admittance: Mapping[str, Any] = field(default_factory=dict)
-    #: Where the file's numbers come from: keys id, what and ref, in words.
+    #: Where numbers come from: id, what and ref, in words.
     sources: tuple[Mapping[str, Any], ...] = ()
-    #: The publication with numbers of this arm that the tables show too, and these.
+    #: A publication's numbers of this arm for the tables.
     published: Mapping[str, Any] = field(default_factory=dict)
     #: The whole parsed robot file, for writing a changed one.
     document: Mapping[str, Any] = field(default_factory=dict)
@@ -189,7 +189,7 @@ class Robot(Shown):
 
     @cached_property
     def model(self) -> Any:  # noqa: ANN401 - Pinocchio is untyped
-        """The Pinocchio model of the loaded chain, with a frame ``flange``."""
+        """Pinocchio's model of the loaded chain, with a frame ``flange``."""
         return self.loaded_chain.to_pinocchio(self.name)
 
     def save(self, file: "str | Path", *, force: bool = False) -> None:
@@ -221,7 +221,7 @@ class FlangeSolver:
     """
 
     def __init__(self, robot: Robot, reached: float = 1e-6, *, limited: bool = True) -> None:
-        self.model, self.reached = robot.model, reached  # who lacks Pinocchio reads it here
+        self.model, self.reached = robot.model, reached  # an error without Pinocchio
         import pinocchio as pin
         from scipy.linalg.lapack import dposv
 

@@ -28,7 +28,7 @@ class ValueKind(NamedTuple):
     fits: Callable[[Any], bool]  #: Whether a value of TOML is one.
 
     def broken(self, name: str, value: object) -> str:
-        """The complaint about the value of a key, "" where it is of the kind."""
+        """The complaint about a key's value, "" where it is of the kind."""
         return "" if self.fits(value) else f"{name} is {shown(value)}; it must be {self.words}"
 
     def check(self, name: str, value: object) -> None:
@@ -151,7 +151,7 @@ LIGHTEST = 0.05
 
 
 def out_of_bounds(key: str, values: Sequence[float]) -> str:
-    """Say which number of a robot file no robot has, or "" if all may be."""
+    """Say which number no robot has, or "" if all may be."""
     return BOUNDS.get(key, UNNAMED).broken(key, values)
 
 
@@ -228,7 +228,7 @@ class Section(NamedTuple):
         raise RobotError(f"{where}: {owner}{message}")
 
     def value(self, key: str, kind: ValueKind, default: Any = None) -> Any:  # noqa: ANN401 - TOML's
-        """The value of a key, `default` if it is absent, or a complaint about its line."""
+        """The value of a key, `default` if absent, or a complaint."""
         if key in self.values:
             if why := kind.broken(key, self.values[key]):
                 self.refuse(why, key)

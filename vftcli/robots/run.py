@@ -115,7 +115,7 @@ class Run(Shown):
 
     @cached_property
     def moving(self) -> Mask:
-        """Where a joint is not at rest, read-only: all estimates share it. (T, n)"""
+        """Where a joint is not at rest, read-only. (T, n)"""
         return handed_over(~self.standing)
 
     @cached_property
@@ -170,7 +170,7 @@ class Run(Shown):
         return replace(self, recording=motion).holding(**values)
 
     def spare(self, *others: str) -> None:
-        """Free `BULKY` and `others` of a long recording; they can be made again."""
+        """Free `BULKY` and `others` of a long recording."""
         self.recording.release()
         if self.recording.samples > LONG:
             if terms := vars(self).get("terms"):
@@ -183,7 +183,7 @@ class Run(Shown):
 
 
 def block_means(x: Array, count: int) -> Array:
-    """Means of so many rows each, without the rows of a last broken block. (T', …)"""
+    """Means of so many rows each, a last broken block left out. (T', …)"""
     whole = len(x) // count * count
     total = sum((x[k:whole:count] for k in range(1, count)), start=x[:whole:count])
     return handed_over(total / count)
@@ -273,7 +273,7 @@ def places(logged: Sequence[str], joints: Sequence[str]) -> tuple[int, ...] | No
     if all(logged.count(name) == 1 for name in joints):
         return tuple(logged.index(name) for name in joints)
     there, wanted = list(map(plain, logged)), list(map(plain, joints))
-    # What all of the robot's names share up to a separator says nothing of a joint.
+    # What the robot's names all begin with says nothing of a joint.
     heads = (wanted[0][: k + 1] for k, letter in enumerate(wanted[0]) if letter == "_")
     own = [head for head in heads if all(name.startswith(head) for name in wanted)]
     bare = [name.removeprefix(max(own, default="")) for name in wanted]

@@ -31,7 +31,7 @@ ZERO = Value(0.0)
 Vector = tuple[Value, Value, Value]
 NOTHING: Vector = (ZERO, ZERO, ZERO)
 
-Operand = int | np.float64  #: Of an operation: the number of a row, or a constant.
+Operand = int | np.float64  #: The number of a row, or a constant.
 
 
 class Operation(NamedTuple):

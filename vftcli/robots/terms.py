@@ -192,7 +192,7 @@ def disturbance_impulse(terms: DynamicsTerms) -> Array:
 
 
 class Blocks(NamedTuple):
-    """The raw disturbance averaged over blocks of time that follow one another."""
+    """The raw disturbance averaged over successive blocks of time."""
 
     t: Array  #: Middle of each block. (K,) [s]
     length: Array  #: How long it lasts. (K,) [s]
@@ -255,7 +255,7 @@ def disturbance_stretches(terms: DynamicsTerms, inside: Mask, step: float) -> li
     if len(t) > 1 and is_uniform(t):
         d = raw_disturbance(terms)
         return [d[start:stop] for start, stop in runs_of(whole)]
-    # Across a gap the mean of two μ says nothing of what was between them.
+    # Across a gap the mean of two μ says nothing.
     whole[gaps_of(t, GAP)] = False
     total, stretches = disturbance_impulse(terms), []
     for start, stop in runs_of(whole):

@@ -95,7 +95,7 @@ class UrdfPart(NamedTuple):
         if self.element.find("mimic") is not None and not follows:
             self.refuse("<mimic> names no joint")
         limits = self.given(limit, LIMITS)
-        # Of an endless joint no positions; other limits that are zero say nothing.
+        # None of an endless joint's positions; other zero limits say nothing.
         endless = kind == "continuous"
         known = {k: v for k, v in limits.items() if (not endless if k[:2] == "q_" else v > 0)}
         followed = self.given(mimic, {key: key for key in ("multiplier", "offset")})
@@ -133,7 +133,7 @@ class UrdfPart(NamedTuple):
         if axis is None or not moving:
             return np.array([1.0, 0.0, 0.0])
         vector = np.array(self.numbers(axis, "xyz", 3))
-        # An axis is normalised: shorter, it is rounding, longer, its square overflows.
+        # Shorter, an axis is rounding; longer, its square overflows.
         if not 1e-9 < abs(vector).max() < 1e9:
             self.refuse(f"axis is {axis.get('xyz')!r}; it must point somewhere")
         return np.asarray(vector / np.linalg.norm(vector))
@@ -223,7 +223,7 @@ def mjcf_tree(path: Path, root: ET.Element) -> BodyTree:
     bodies = {names[0]: NO_BODY, **{names[k]: mjcf_body(path, model, k) for k in moved}}
     joints = [mjcf_joint(path, model, k, names) for k in moved]
     for frame in model.frames:
-        # Bodies without a joint, and sites, are frames of the joint that moves them.
+        # Bodies without a joint, and sites, are frames of their joint.
         if frame.name not in bodies and frame.type != pin.FrameType.JOINT:
             bodies[frame.name] = NO_BODY
             joints.append(
@@ -301,7 +301,7 @@ def mjcf_joint(path: Path, model: Any, k: int, names: list[str]) -> TreeJoint:  
 def parser_words() -> Iterator[list[str]]:
     """Catch what C++ code writes to stderr; the list holds its lines then."""
     lines: list[str] = []
-    with suppress(OSError, ValueError, AttributeError):  # a stderr that is closed, or not a file
+    with suppress(OSError, ValueError, AttributeError):  # closed, or not a file
         sys.stderr.flush()
     try:
         own = os.dup(2)

@@ -54,7 +54,7 @@ def expand(asked: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def main() -> None:
-    """Expand what standard input asks for, and write the outcome to standard output."""
+    """Expand what standard input asks for to standard output."""
     asked = json.load(sys.stdin)
     seconds, memory = asked["seconds"], asked["memory"]
     with suppress(ImportError):  # Windows has no such limits

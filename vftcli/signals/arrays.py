@@ -68,7 +68,7 @@ def seal(
     """Make a frozen dataclass's arrays read-only, check their shape; None stays None."""
     for name in names:
         if (value := getattr(owner, name)) is not None:
-            # The one way past a frozen dataclass, for its own __post_init__ only.
+            # Past a frozen dataclass, for its own __post_init__ only.
             object.__setattr__(owner, name, number_array(value, name, type(owner).__name__, kind))
             if shape:
                 check_shape(value, shape, name, called)
@@ -117,7 +117,7 @@ def check_shape(value: ArrayLike, shape: tuple[int | str, ...], name: str, owner
 def median(values: Array) -> float:
     """Median of a (T,) array; NumPy's own imports its masked arrays."""
     middle = len(values) // 2
-    # Parting at one place takes NumPy sixty times as long where many values are equal.
+    # Parting at one place takes sixty times as long where values are equal.
     parted = np.partition(values, (middle - 1, middle))
     upper = float(parted[middle])
     return upper if len(values) % 2 else 0.5 * (float(parted[middle - 1]) + upper)

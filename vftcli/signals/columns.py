@@ -40,7 +40,7 @@ COLUMNS: dict[str, tuple[str, str]] = {
         "number of the contact in the list that the sample belongs to, null outside",
     ),
 }
-ON_ROBOT = "on the robot"  #: Whose force it is: the environment's on the robot.
+ON_ROBOT = "on the robot"  #: The environment's force.
 
 
 class StatedFrame(NamedTuple):

@@ -7,7 +7,7 @@ from typing import Any
 
 
 class VftError(Exception):
-    """Base class of every error that is the input's fault rather than the program's."""
+    """Base class of every error that is the input's fault."""
 
 
 class ShapeError(VftError):
@@ -47,7 +47,7 @@ class UnsettledRobotError(RobotError):
 
 
 class ParameterError(VftError):
-    """A parameter is unknown or outside the range in which the method is defined."""
+    """A parameter is unknown, or outside its range."""
 
 
 class ReferenceTorqueError(VftError):
@@ -59,7 +59,7 @@ class OutputError(VftError):
 
 
 class IdentificationError(VftError):
-    """A log does not determine what shall be identified, or contradicts the robot."""
+    """A log does not determine what is sought, or contradicts the robot."""
 
 
 class PackageError(VftError):

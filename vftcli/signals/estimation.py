@@ -65,7 +65,7 @@ def fit_column(A: Array, y: Array, weights: Array) -> ColumnFit:
 
 
 class NormalEquations(NamedTuple):
-    """Normal equations: all that least squares needs of any number of rows."""
+    """All that least squares needs of any number of rows."""
 
     gram: Array  #: AᵀWA. (k, k)
     right: Array  #: AᵀWy. (k,)
@@ -151,7 +151,7 @@ def deviations(A: Array, residual: Array, weights: Array) -> Array:
 
 
 def folds(samples: int, count: int = FOLDS) -> list[slice]:
-    """Contiguous stretches of equal length that cover all samples."""
+    """Contiguous stretches of equal length over all samples."""
     edges = np.linspace(0, samples, count + 1).astype(int)
     return list(itertools.starmap(slice, itertools.pairwise(edges)))
 
@@ -231,7 +231,7 @@ def filtered(model: LinearModel, limit: Array | None = None) -> Iterator[Filtere
             gain /= np.where(square > limit[k], SPIKE, 1.0)[..., None, None]
         x, P = x + times(gain, nu), P - times(gain, PH.swapaxes(-1, -2))
         if not alone:
-            # Rounding leaves the two triangles apart, and lets them drift.
+            # Rounding lets the two triangles drift apart.
             P = 0.5 * (P + P.swapaxes(-1, -2))
         yield FilteredBlock(x[..., 0], P, predicted, square, S)
 

@@ -24,7 +24,7 @@ from vftcli.signals.shown import ALL, Shown, TimeSeries, joined, per_joint, reco
 
 
 class Instant(NamedTuple):
-    """The terms of one sample, from which those of the next block of a log go on."""
+    """The terms of a sample, from which the next block goes on."""
 
     t: float  #: Time. [s]
     p: Array  #: Generalised momentum. (n,) [kg·m²/s]
@@ -82,7 +82,7 @@ class DynamicsTerms(Shown):
 
     @property
     def last(self) -> Instant:
-        """The last sample, which is the one before the next block's first."""
+        """The sample before the next block's first."""
         return Instant(self.t[-1], self.p[-1], self.mu[-1])
 
     @cached_property

@@ -55,7 +55,7 @@ def fits(late: Array, early: Array, known: Mask, at: Indices) -> Array:
 
     All are without mean, and zero where unknown; `at` are successive lags [samples].
     """
-    # Each is normalised by the samples that overlap at that lag, unknown ones left out.
+    # Each is normalised by the known samples that overlap at that lag.
     if known.all():
         samples = len(known)
         behind = np.stack([overlap_energy(x[:, None], at, samples) for x in late])
@@ -72,7 +72,7 @@ def sliding(later: Array, earlier: Array, at: Indices) -> Array:
     Blocks of `earlier` meet what their lags reach; spectra are added up (overlap-save).
     """
     samples, first, reach = earlier.shape[1], int(at[0]), len(at) - 1
-    # A block no longer than the log, and no shorter than what its lags reach besides.
+    # A block no longer than the log, no shorter than its lags reach.
     size, whole = (1 << max(count - 1, 1).bit_length() for count in (2 * reach, samples + reach))
     size = min(max(BLOCK, size), whole)
     hop = size - reach

@@ -115,7 +115,7 @@ class Option(NamedTuple):
 
 
 def names_at(place: str) -> Callable[[], Iterable[str]]:
-    """A function that lists the names of ``module:TABLE``, which is loaded only then."""
+    """A function that loads and lists the names of ``module:TABLE``."""
     module, _, table = place.partition(":")
     return lambda: getattr(import_module(f"vftcli.{module}"), table)
 
@@ -131,7 +131,7 @@ NUMBERS = "numbers"
 
 @typing.dataclass_transform(frozen_default=True, kw_only_default=True)
 class Choice:
-    """A user's choices in a room: a frozen dataclass of fields, an `Option` each."""
+    """A user's choices in a room: a frozen dataclass of `Option` fields."""
 
     GROUP: ClassVar[str] = ""  #: Heading of its options.
 
@@ -150,7 +150,7 @@ class Choice:
 
     @classmethod
     def option(cls, word: str, **changed: Any) -> Option:  # noqa: ANN401 - an option's fields
-        """One of the options, for a command that has it in another way."""
+        """One of the options with other fields."""
         return cls.options()[word][2]._replace(**changed)
 
     @classmethod
@@ -262,7 +262,7 @@ def interval(text: str) -> tuple[float, float]:
 
 
 def interval_text(start: float, stop: float) -> str:
-    """The ``A:B`` that `interval` reads as these times, an infinite end left out. [s]"""
+    """The ``A:B`` that `interval` reads as these times. [s]"""
     return ":".join("" if abs(end) == float("inf") else f"{end:g}" for end in (start, stop))
 
 

@@ -29,7 +29,7 @@ def installed(module: str) -> bool:
 
 
 def check_installed(module: str, what: str) -> None:
-    """See whether the package that something needs is there; it is not loaded."""
+    """See, without loading it, whether a needed package is there."""
     if not installed(module):
         needed(module, what)
 

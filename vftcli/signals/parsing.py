@@ -65,7 +65,7 @@ def did_you_mean(word: str, known: Iterable[str]) -> str:
 
 
 def check_known(word: str, known: Iterable[str], complaint: str) -> None:
-    """Raise a ParameterError that says what there is unless a word is known."""
+    """Raise a ParameterError with what there is unless a word is known."""
     if word not in (there := list(known)):
         near = did_you_mean(word, there)
         raise ParameterError(f"{complaint}; there is {', '.join(there)}{'.' * bool(near)}{near}")
@@ -112,7 +112,7 @@ def toml_tables(text: str) -> dict[str, Any]:
         return tomllib.loads(text)
     except RecursionError:
         raise ParameterError("not valid TOML: nested too deep") from None
-    except ValueError as error:  # TOML's own, and that of an integer of thousands of digits
+    except ValueError as error:  # TOML's own, or an integer's
         raise ParameterError(f"not valid TOML: {error}") from None
 
 

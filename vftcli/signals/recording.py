@@ -227,7 +227,7 @@ class Recording(TimeSeries):
 
     @cached_property
     def name(self) -> str:
-        """Its name in tables and messages: its label, unique within a command."""
+        """Its name in tables and messages, unique within a command."""
         return self.source.label or "recording"
 
     @cached_property
@@ -257,13 +257,13 @@ class Recording(TimeSeries):
         return replace(self, **{name: getattr(self, name)[rows] for name in ("t", *self.signals)})
 
     def blocks(self, size: int) -> Iterator["Recording"]:
-        """Blocks of so many samples, but for the last; one at a time is held in memory."""
+        """Blocks of so many samples, one at a time in memory."""
         for start in range(0, self.samples, size):
             yield self.rows(slice(start, start + size))
             self.release()
 
     def release(self) -> None:
-        """Give the memory of long signals back; what lies in a file can be read again."""
+        """Give the memory of long signals back; files can be read again."""
         for name in self.signals:
             release(getattr(self, name))
 
@@ -307,7 +307,7 @@ class Recording(TimeSeries):
 
 
 def trim() -> None:
-    """Give free memory back to the system, where the C library has a call for it."""
+    """Give free memory back to the system, if the C library can."""
     import ctypes
 
     with suppress(AttributeError, OSError, TypeError):
@@ -315,7 +315,7 @@ def trim() -> None:
 
 
 def pieces(values: NDArray[Any]) -> Iterator[NDArray[Any]]:
-    """The rows of an array, 65 536 at a time; of a mapped one no more lie in memory."""
+    """The rows of an array, 65 536 at a time in memory."""
     for start in range(0, max(len(values), 1), size := 1 << 16):
         yield values[start : start + size]
         release(values)
@@ -330,7 +330,7 @@ def same_run(one: Recording, other: Recording) -> bool:
         return True
     mine, theirs = one.source, other.source
     if (mine.rows, mine.t0, mine.part) != (theirs.rows, theirs.t0, theirs.part):
-        return False  # so that nobody waits for the digest of a large file to hear this
+        return False  # without waiting for a digest
     return bool(mine.sha256) and mine.sha256 == theirs.sha256
 
 

@@ -148,7 +148,7 @@ class ListFormatter(string.Formatter):
 def words(code: str) -> Mapping[str, str]:
     """A code's entry of the catalogue."""
     for text in catalogue():
-        # Reading TOML takes longer than finding the one file of a room that has the code.
+        # Reading TOML takes longer than finding the file that has the code.
         if f"[{code}]" in text:
             return parsed(text)[code]
     raise LookupError(f"no words for the remark {code!r} in {WORDS}")
@@ -167,7 +167,7 @@ def parsed(text: str) -> Mapping[str, Mapping[str, str]]:
 
 
 def as_record(remark: Remark) -> dict[str, Any]:
-    """A remark as `run.json` holds it: code, level, values, place, and its words."""
+    """A remark with its words, as `run.json` holds it."""
     where = remark.where
     return {
         "code": remark.code,

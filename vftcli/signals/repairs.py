@@ -27,7 +27,7 @@ OF_NYQUIST = 0.4  #: The same in a slow log, as a share of half its rate.
 BLUNTED = 0.48
 #: How far positions travel at most that are logged within a turn. [rad]
 ONE_TURN = 2 * np.pi + 0.1
-RATE = 50.0  #: Rate from which velocities are derived without being asked for. [Hz]
+RATE = 50.0  #: Rate from which velocities are derived unasked. [Hz]
 
 
 def with_velocity(recording: Recording, slowest: float = 0.0) -> Recording:
@@ -86,7 +86,7 @@ def without_isolated(recording: Recording) -> Recording:
     values = {}
     for name in there:
         x = getattr(recording, name)
-        with np.errstate(all="ignore"):  # what no arm does overflows, and is left as it is
+        with np.errstate(all="ignore"):  # what no arm does overflows
             inner = np.quantile(x, (0.01, 0.99), axis=0)  # all but its outer hundredths
             span = SPREAD * (inner[1] - inner[0]) if name != "q" else 0.0
             least = np.maximum(span, LEAST.get(name, FINEST))

@@ -47,7 +47,7 @@ def duration(t: Array, dq: Array) -> Array:
 
 def standing(t: Array, dq: Array) -> Mask:
     """Where a joint stops for `LEAST` seconds, and moments around. (T, n)"""
-    # A joint is stuck before its speed is zero and settles after it has broken away.
+    # It is stuck before its speed is zero and settles after breaking away.
     return np.column_stack([grown(t, long, BREAKAWAY) for long in (duration(t, dq) >= LEAST).T])
 
 

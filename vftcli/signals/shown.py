@@ -60,7 +60,7 @@ class Shown:
 
 
 def cell(value: object) -> str:
-    """A value as a table shows it: a dash for unknown, four digits of a number."""
+    """A value in a table: a dash for unknown, four digits of a number."""
     if value is None or (isinstance(value, float) and np.isnan(value)):
         return UNKNOWN
     return f"{value:.4g}" if isinstance(value, float) else str(value)
@@ -106,7 +106,7 @@ def frame_of(columns: Iterable[tuple[str, Any]]) -> "pl.DataFrame":
 
     given = dict(columns)
     table = pl.DataFrame(given)
-    # Only columns that need it: to fill all of a long log takes longer than to write it.
+    # Only columns that need it: to fill all takes longer than to write.
     floats = {s.name: np.asarray(given[s.name], float) for s in table if s.dtype == pl.Float64}
     unknown = [name for name, x in floats.items() if x.size and np.isnan(x.min())]
     return table.with_columns(pl.col(unknown).fill_nan(None)) if unknown else table

@@ -70,7 +70,7 @@ def steady_filter(
             rows = answer[j, :covered].reshape(count, BLOCK)
             np.matmul(inputs[j], toeplitz[j], out=rows)
             rows += np.dot(x[j, :-1], carry[j])
-        # The few samples left fill no block: the same matrices, cut off.
+        # The few samples left: the same matrices, cut off.
         rest, left, state = piece[:, None, covered:], samples - covered, x[:, -1]
         tail = rest @ toeplitz[:, :left, :left] + state[:, None] @ carry[:, :, :left]
         answer[:, covered:] = tail[:, 0]
@@ -110,7 +110,7 @@ class Fold(NamedTuple):
 
     @classmethod
     def of(cls, samples: int) -> "Fold":
-        """The layout of a piece: of short ones as many blocks as samples in a block."""
+        """The layout of a piece, of a short one square."""
         return cls(min(LENGTH, int(np.ceil(np.sqrt(samples)))), samples)
 
     def fold(self, x: Array) -> Array:
@@ -120,7 +120,7 @@ class Fold(NamedTuple):
         return np.moveaxis(blocks, -3, -1).copy()
 
     def unfold(self, y: Array) -> Array:
-        """Samples in their order: (…, length, k, blocks) → (…, N, k), columns whole."""
+        """Samples in their order: (…, length, k, blocks) → (…, N, k)."""
         columns = np.moveaxis(y, -3, -1).reshape(*y.shape[:-3], y.shape[-2], -1)
         return columns[..., : self.samples].swapaxes(-1, -2)
 

@@ -22,7 +22,7 @@ from vftcli.simulation.trajectories import Reference
 STIFFNESS = {"stiff": 90.0, "soft": 28.0}
 #: Largest natural frequency times step: beyond it the loop is badly damped or unstable.
 FASTEST_LOOP = 0.4
-WARMING_STEPS = 250  #: Inner steps between two updates of the friction's temperature.
+WARMING_STEPS = 250  #: Inner steps between updates of the temperature.
 CHECK_STEPS = 10  #: Inner steps between two looks for a runaway.
 RUNAWAY = 200.0  #: Joint velocity no arm reaches. [rad/s]
 #: Largest relative deviation: drawn twice as large, it leaves nothing negative.
@@ -90,9 +90,9 @@ class TrueArm(NamedTuple):
 
     chain: Chain  #: Geometry and inertia, payload and sensor mounted.
     friction: TrueFriction  #: Friction.
-    gain: Array  #: What the torque measurement reads for a unit of torque. (n,)
+    gain: Array  #: What is read for a unit of torque. (n,)
     offset: Array  #: What it reads for none. (n,) [N·m]
-    nominal: Robot  #: The controller's robot: the profile with the payload it knows of.
+    nominal: Robot  #: The controller's: the profile with its payload.
 
 
 class Arm:
@@ -197,7 +197,7 @@ class Arm:
             )
 
     def temperature(self, t: Array) -> Array:
-        """The joints' temperature at true times (N,) [s] of the run. (N, n) [°C]"""
+        """The joints' temperature at true times (N,) [s]. (N, n) [°C]"""
         spec, friction = self.scenario.friction, self.robot.friction
         references = [joint.reference_temperature for joint in friction]
         begin = np.array(references or [REFERENCE] * len(self.q))
@@ -208,7 +208,7 @@ class Arm:
         return np.asarray(begin + (end - begin) * share)
 
     def close(self) -> dict[str, Array]:
-        """The history so far; its last values fill the row after the last step."""
+        """The history so far, its last row filled."""
         self.check_motion()
         history, k = self.history, self.made
         for array in history.values():
@@ -240,7 +240,7 @@ def as_payload(spec: PayloadSpec, scale: float = 1.0) -> Payload:
 
 
 def build_arm(scenario: Scenario, robot: Robot, rng: np.random.Generator) -> TrueArm:
-    """The arm of a scenario; its sizes do not change the drawn numbers."""
+    """The arm of a scenario; sizes do not change what is drawn."""
     sizes, n = scenario.mismatch, robot.joints
     for name, size in vars(sizes).items():
         most = ABSOLUTE.get(name, LARGEST_SHARE)
@@ -261,7 +261,7 @@ def build_arm(scenario: Scenario, robot: Robot, rng: np.random.Generator) -> Tru
     friction = true_friction(robot, scenario.friction).times(dry, wet)
     gain = 1.0 + deviate(rng, sizes.torque_constant, (n,))
     offset = deviate(rng, sizes.torque_offset, (n,))
-    # Drawn whether or not there is a payload, so that other draws do not move.
+    # Always drawn, so that other draws do not move.
     scale = 1.0 + deviate(rng, sizes.payload, (1,))[0]
     if scenario.payload is not None:
         chain = chain.with_payload(as_payload(scenario.payload, scale))

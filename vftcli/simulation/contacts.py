@@ -14,13 +14,7 @@ from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.parsing import check_known
 from vftcli.signals.pose import cross
-from vftcli.simulation.scenario import (
-    ContactSpec,
-    HandSpec,
-    LoadSpec,
-    PushesSpec,
-    StopSpec,
-)
+from vftcli.simulation.scenario import ContactSpec, HandSpec, LoadSpec, PushesSpec, StopSpec
 from vftcli.simulation.trajectories import minimum_jerk
 
 
@@ -115,7 +109,7 @@ def hand_of(spec: HandSpec) -> SimulatedContact:
     grips = dict[int, Place]()
 
     def wrench(k: int, t: float, place: Place) -> Array:
-        # A hand takes hold where the handle is at that moment, wherever that may be.
+        # A hand takes hold where the handle is at that moment.
         held = grips.setdefault(k, place)
         u = min((t - spec.spans[k][0]) / spec.reach, 1.0) if spec.reach > 0 else 1.0
         way = minimum_jerk(u)
@@ -191,7 +185,7 @@ class Mounted(NamedTuple):
     joint: int  #: The joint that carries the body, from 1.
     turn: Array  #: Orientation of the link's frame in the joint's frame. (3, 3)
     point: Array  #: The contact's point in the joint's frame. (3,) [m]
-    lever: Array | None  #: The point in flange axes of a contact on the flange. (3,) [m]
+    lever: Array | None  #: The point in flange axes, of the flange. (3,) [m]
 
 
 class Touching:
@@ -212,7 +206,7 @@ class Touching:
             raise ParameterError(
                 f"two contacts are named {doubled.pop()!r}; name each its own way"
             )
-        # A generator a contact: adding one leaves what the others draw as it was.
+        # A generator a contact: a further one changes no other.
         rngs = [np.random.default_rng(s) for s in seed.spawn(len(specs))]
         self.mounted: list[Mounted] = []
         for spec, rng in zip(specs, rngs, strict=True):

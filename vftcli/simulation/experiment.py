@@ -16,13 +16,7 @@ from vftcli.signals.shown import per_joint
 from vftcli.signals.wrench import WrenchFrame, per_axis
 from vftcli.simulation.arm import Arm
 from vftcli.simulation.scenario import Scenario
-from vftcli.simulation.sensing import (
-    Measured,
-    Samples,
-    check_sensing,
-    measure_run,
-    sample_run,
-)
+from vftcli.simulation.sensing import Measured, Samples, check_sensing, measure_run, sample_run
 from vftcli.simulation.trajectories import Reference, plan
 
 #: Most inner steps of a run: half an hour at 1 ms, a gigabyte of history.
@@ -34,7 +28,7 @@ PAIR_SEED = 1_000_003
 class Truth(NamedTuple):
     """True torques and wrenches at each sample, on the log's clock."""
 
-    t: Array  #: Time since the log's first sample, on its clock without jitter. (M,) [s]
+    t: Array  #: Time since the log's first sample, without jitter. (M,) [s]
     tau_ext: Array  #: External torque on the robot, Σ Jᵢᵀ wᵢ over the contacts. (M, n) [N·m]
     #: Wrench of all contacts on the flange, about its origin, in base axes. (M, 6)
     wrench: Array
@@ -42,7 +36,7 @@ class Truth(NamedTuple):
     contacts: dict[str, Array]
 
     def columns(self) -> dict[str, Array]:
-        """Columns of the truth file, flat, in order, t from the first sample. (M,) each"""
+        """Columns of the truth file, t from the first sample. (M,) each"""
         table = {"t": self.t}
         table |= [*per_joint("tau_ext", self.tau_ext), *per_axis("wrench", self.wrench)]
         for name, values in self.contacts.items():
@@ -56,7 +50,7 @@ class Simulation(NamedTuple):
     scenario: Scenario  #: The experiment.
     seed: int  #: The seed used.
     robot: Robot  #: The profile.
-    nominal: Robot  #: The controller's robot: the profile with the payload it knows.
+    nominal: Robot  #: The controller's: the profile with its payload.
     samples: Samples  #: True signals at the sampling instants.
     measured: Measured  #: The controller's log.
     truth: Truth  #: What really happened.

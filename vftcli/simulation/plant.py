@@ -35,7 +35,7 @@ WET = ("viscous", "quadratic", "logarithmic", "bend_slopes")  #: What does: the 
 #: Below it a soft joint's dry friction fades: on a UR10e 3 mrad/s leave least. [rad/s]
 CREEP = 3e-3
 LARGEST_STEP = 1e-3  #: Largest inner step. [s]
-GUESSES = 12  #: Active-set guesses before the slower way that always converges takes over.
+GUESSES = 12  #: Active-set guesses before the slower way that always converges.
 #: Torque of the contacts (n,) [N·m] amid a step, of current Pinocchio data and velocities.
 External = Callable[[Any, Any, Array], Array]
 
@@ -53,11 +53,11 @@ class TrueFriction:
     amplitude: Array  #: Amplitude of the sigmoid. [N·m]
     slope: Array  #: Slope of the sigmoid. [s/rad]
     shift: Array  #: Shift of the sigmoid. [rad/s]
-    load_coulomb: Array  #: Growth of the dry friction with the gravity torque carried. [1]
+    load_coulomb: Array  #: Growth of the dry friction with the load. [1]
     presliding: Array  #: Presliding friction at full deflection. [N·m]
     presliding_length: Array  #: Deflection s₀ at which it is full. [rad]
-    bends: Array  #: Speeds v_k at which the rise of a bent line changes. (K, n) [rad/s]
-    bend_slopes: Array  #: By how much it changes there, m_k. (K, n) [N·m·s/rad]
+    bends: Array  #: Speeds v_k of a bent line's bends. (K, n) [rad/s]
+    bend_slopes: Array  #: Changes of slope there, m_k. (K, n) [N·m·s/rad]
     stribeck: float = 0.0  #: Excess of the breakaway torque, as a share of `coulomb`.
     stribeck_velocity: float = 0.05  #: Velocity over which it fades. [rad/s]
 
@@ -105,7 +105,7 @@ class TrueFriction:
 
     @cached_property
     def present(self) -> frozenset[str]:
-        """Parameters that any joint has; others are left out of a step."""
+        """Parameters that any joint has."""
         return frozenset(name for name in SHAPES if getattr(self, name).any())
 
     def times(self, dry: Array, wet: Array) -> "TrueFriction":

@@ -42,7 +42,7 @@ class Measured(NamedTuple):
     """A controller's log, one row a sample."""
 
     stamp: Array  #: Time stamps, jittering. (M,) [s]
-    #: Sample in each row of the log; lost ones are missing, repeated ones come twice.
+    #: Sample in each row: lost ones are missing, repeated ones come twice.
     rows: Indices
     #: Field of a recording → its signal, the controller's targets and estimate too. (M, n) each
     signals: dict[str, Array]

@@ -134,7 +134,7 @@ def pose_of(flange: FlangeMotion) -> Array:
 
 
 class VendorTable(NamedTuple):
-    """A format: its columns, the mark of an element's number, rows and numbers."""
+    """A format: columns, an element's mark, rows and numbers."""
 
     columns: Columns
     element: str
@@ -180,7 +180,7 @@ class VendorTable(NamedTuple):
         path.write_bytes((self.end.join(lines) + self.end).encode("ascii"))
 
 
-RTDE = VendorTable(CLIENT, "_{}", " ", "\r\n", "%r", 9)  # the client prints all seventeen digits
+RTDE = VendorTable(CLIENT, "_{}", " ", "\r\n", "%r", 9)  # all seventeen digits
 UR_RTDE = VendorTable(RECORDER, "_{}", ",", "\n", "%.6f", 9)
 LIBFRANKA = VendorTable(FRANKA, "[{}]", ",", "\n", "%.6g")
 
@@ -197,7 +197,7 @@ def write_parquet(path: Path, simulation: Simulation) -> None:
 
 
 def write_truth(path: Path, truth: Truth, start: float) -> None:
-    """Write the truth beside a log that begins at `start` [s]: the same clock."""
+    """Write the truth of a log that begins at `start` [s]."""
     columns = truth.columns()
     touched = {name.rpartition("/")[0] for name in columns if name.startswith("contact/")}
     frames = {"wrench": StatedFrame(TRUTH_FRAME)} | dict.fromkeys(
@@ -207,11 +207,9 @@ def write_truth(path: Path, truth: Truth, start: float) -> None:
 
 
 def write_columns(
-    path: Path,
-    columns: dict[str, Array],
-    frames: Mapping[str, StatedFrame] | None = None,
+    path: Path, columns: dict[str, Array], frames: Mapping[str, StatedFrame] | None = None
 ) -> None:
-    """Write named columns (M,) of doubles as a Parquet table, wrenches with frames."""
+    """Write named columns (M,) as a Parquet table, wrenches with frames."""
     import polars as pl
 
     table = pl.DataFrame(columns)

@@ -8,20 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vftcli.readers.bags.container import Bytes, type_name
-from vftcli.readers.bags.decode import (
-    SIZES,
-    MessageLayout,
-    element_of,
-    long_name,
-    type_store,
-)
+from vftcli.readers.bags.decode import SIZES, MessageLayout, element_of, long_name, type_store
 from vftcli.signals.arrays import Array, Indices
 from vftcli.signals.errors import OutputError
 from vftcli.signals.pose import matrix_quaternion
 from vftcli.simulation.experiment import FlangeMotion, Simulation
 from vftcli.wrench.solvers import wrench_of
 
-RECEIVED_LATER_NS = 400_000  #: How long after its stamp a message reaches the recorder. [ns]
+RECEIVED_LATER_NS = 400_000  #: From a message's stamp to its recording. [ns]
 MODE_MOVE = 2  #: ROBOT_MODE_MOVE of FrankaRobotState.
 
 JOINT_STATE = "sensor_msgs/JointState"
@@ -31,7 +25,7 @@ ROBOT_STATE = "franka_msgs/FrankaRobotState"
 
 #: Names of a message's two vectors.
 WRENCH, TWIST = ("force", "torque"), ("linear", "angular")
-SAME = np.zeros((1, 3)), np.eye(3)[None]  #: Position and rotation of one frame in itself.
+SAME = np.zeros((1, 3)), np.eye(3)[None]  #: The pose of a frame in itself.
 
 #: Text, names, a number, or numbers: one row a message, or one row for all.
 Value = str | Sequence[str] | float | NDArray[Any]
@@ -170,13 +164,13 @@ def in_parts(path: str, names: str, columns: NDArray[Any]) -> dict[str, Value]:
 
 
 def schema_text(kind: str) -> str:
-    """A type's definition, then those of the types inside it, as bags embed them."""
+    """A type's definition and those inside it, as bags embed them."""
     text: str = type_store().generate_msgdef(long_name(kind), ros_version=2)[0]
     return text
 
 
 def six(path: str, names: tuple[str, str], columns: Array) -> dict[str, Value]:
-    """Six numbers as two vectors: force and torque, or linear and angular velocity."""
+    """Six numbers as two vectors: a wrench, or a twist."""
     first, second = (f"{path}.{name}" for name in names)
     return {**in_parts(first, "xyz", columns[:, :3]), **in_parts(second, "xyz", columns[:, 3:])}
 
