@@ -149,7 +149,7 @@ class Loop:
         self.sensor.sample(self.q_measured, arm.v + dq, arm.mean_torque(self.span) + torque)
 
     def act(self, zero: tuple[float, float] | None) -> dict[str, Any]:
-        """One control period, as a row: Algorithm 1, or rest in the zero's span."""
+        """One control period, as a row: Algorithm 1, or rest."""
         t, wrench = self.arm.t, self.sensor.wrench(self.q_measured)
         # Following its own drift it would never find a still arm's zero.
         first, last = zero or (np.inf, -np.inf)
@@ -264,7 +264,7 @@ def run_closed_loop(
 
 
 def still_arm(scenario: Scenario, period: float, seed: int | None) -> Arm:
-    """The scenario's arm at rest at its start; its inner step divides the period."""
+    """The scenario's arm at rest; its inner step divides the period."""
     robot = load_robot(scenario.robot)
     count = period / scenario.step
     if abs(count - round(count)) >= 1e-9:
@@ -323,7 +323,7 @@ def latencies(run: ClosedLoop) -> tuple[Latency, ...]:
 
 
 def latency_of(run: ClosedLoop, k: int, threshold: Array) -> Latency:
-    """The latencies of the contact that first passes a threshold in row `k`."""
+    """The latencies of the contact that begins in row `k`."""
     axis = int(np.argmax(abs(run.truth[k]) / threshold))
     limit, t = threshold[axis], run.t
     felt, there = abs(run.estimate[:, axis]) > limit, abs(run.truth[:, axis]) > limit

@@ -139,7 +139,7 @@ def release(
 
 
 class Drag(NamedTuple):
-    """One drag of one axis, from passing its force threshold to the next drag."""
+    """One drag of one axis, until the next."""
 
     axis: int  #: Index of the axis.
     number: int  #: Count of the drags of that axis, from 1.
@@ -297,7 +297,7 @@ def follow(robot: Robot, start: Array, x: Array, period: float) -> JointPath:
 
 
 def largest_speed(robot: Robot, q: Array, reached: Mask, period: float) -> Array:
-    """Largest joint speed between reached samples as a share of the limit. (N,)"""
+    """Largest joint speed as a share of the limit. (N,)"""
     share = abs(np.diff(q, axis=0)) / period / robot.limits.qd_max
     both = (reached[1:] & reached[:-1])[:, :, None] & np.isfinite(share)
     largest = np.where(both, share, -1.0).max(axis=(0, 2), initial=-1.0)

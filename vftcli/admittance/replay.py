@@ -216,7 +216,7 @@ def on_control_clock(t: Array, period: float) -> tuple[Array, Indices]:
 
 
 def deviation_of(robot: Robot, start: Array, q: Array) -> Array:
-    """The log's own flange, as a deviation from the start pose. (T, 6) [m, rad]"""
+    """The log's flange, as a deviation from a pose. (T, 6) [m, rad]"""
     R, p = (part[:, -1] for part in link_poses(robot.chain, np.vstack([start, q])))
     return np.hstack([p[1:] - p[0], log_matrix(R[1:] @ R[0].T)])
 

@@ -42,7 +42,7 @@ class Baseline:
     correction: WholeLogBias | None = None
     #: Whether the bias's fit found the free part: a lasting load may be in it.
     by_fit: bool = False
-    #: Its parts in use, those not in use, and the substitute for a free part.
+    #: Its parts in use or not, and the substitute for a free part.
     on_correction: tuple[Remark, ...] = ()
     _made: dict[Run, Run] = field(init=False, repr=False, compare=False, default_factory=dict)
 
@@ -79,7 +79,7 @@ class Baseline:
 
     @property
     def untouched(self) -> tuple[RunSamples, ...]:
-        """The pieces in which nothing at all is known to touch the arm."""
+        """The pieces in which nothing at all touches the arm."""
         return () if self.by_fit else self.pieces
 
     @property
@@ -152,7 +152,7 @@ class FreeReading(NamedTuple):
 
     observer: Observer  #: The observer.
     estimate: ExternalTorque  #: Its estimate of the log.
-    #: Its reading in all free samples, less the free part's load. (S, n) [N·m]
+    #: Its reading in all free samples, less a load. (S, n) [N·m]
     samples: Array
     resting: Mask  #: Whether a joint rests in them. (S, n)
 

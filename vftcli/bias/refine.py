@@ -85,7 +85,7 @@ def stated_band(run: Run, called: FreeError | None, off_sd: Array | None) -> Arr
 
 
 def budget(found: Baseline, spectra: Spectra, reading: FreeReading) -> dict[str, Array]:
-    """RMS of an observer's error by each cause, estimated from the log. (n,) [N·m]
+    """RMS of an observer's error by each cause. (n,) [N·m]
 
     Noise is the flat floor of S_n through |H|²; bandwidth ∫|1−H|²S_τ df. Other readings on
     the free part are friction, as far as velocity explains them, else the model. Stiction
@@ -137,7 +137,7 @@ class Refinement(Shown):
     estimates: tuple[ExternalTorque, ...]  #: The estimates with their bands.
     baselines: Baselines  #: The log's free part and spectra.
     curves: Mapping[str, Curve]  #: Tuned observer → the minimised curve.
-    #: Best observer → RMS of its error by cause; none without spectra. (n,) [N·m]
+    #: Best observer → RMS of its error by cause. (n,) [N·m]
     budget: Mapping[str, Mapping[str, Array]]
     removed: str  #: What ``bias.method`` asked for.
     remarks: tuple[Remark, ...]  #: Remarks on the estimates.

@@ -191,7 +191,7 @@ class Rows:
 
 
 def forward_solved(factor: Array, right: Array) -> Array:
-    """L⁻¹ times right-hand sides, forward substitution in blocks. (N,) or (N, k)"""
+    """L⁻¹ times right-hand sides, in blocks. (N,) or (N, k)"""
     found = right.astype(float)
     for first in range(0, len(found), BLOCK):
         own = slice(first, first + BLOCK)
@@ -282,7 +282,7 @@ LARGEST = 6.0  #: Most scales of a residual.
 #: A joint with less motion than this share is judged by all free samples.
 SELDOM = 0.2
 WORTH = 0.9  #: Most of the unseen error left for a full correction, …
-#: … and least for none; partly between. An inseparable load of 2.8 kg leaves .95.
+#: … and least for none. An inseparable load of 2.8 kg leaves .95.
 WORTHLESS = 0.95
 
 

@@ -128,7 +128,7 @@ def whole_log_bias(run: Run) -> WholeLogBias:
             tried = guarded(fit, motion.dq[::stride])
             if span < LEAST_MOTION:
                 if tried.solution is not None:
-                    # A leading hand looks like less friction, of other size and foresight.
+                    # A leading hand looks like less friction, of another size.
                     torque = np.mean(fit.rows.modelled(tried.solution.model) ** 2, axis=0)
                     usual = np.array([np.sum(c**2, axis=1).mean() for c in columns])
                     worst = np.sqrt(torque / np.maximum(usual, np.finfo(float).tiny)).max()

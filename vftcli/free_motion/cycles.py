@@ -45,7 +45,7 @@ class Period(NamedTuple):
     """A motion's period."""
 
     seconds: float  #: On the log's own clock. [s]
-    #: Lower quartile of the positions' distance after one period. [rad]
+    #: Lower quartile of the distance after a period. [rad]
     deviation: float
 
 
@@ -222,7 +222,7 @@ def segment(recording: Recording, period: Period) -> Cycles:
 
 
 def settled(t: Array, on_path: Mask, seconds: float) -> float:
-    """First instant with three quarters of the next cycle on the path. [s]"""
+    """First instant with most of the next cycle on the path. [s]"""
     count, stop = summed(on_path), t.searchsorted(t + seconds)
     here = np.arange(len(t))
     share = (count[stop] - count[here]) / np.maximum(stop - here, 1)

@@ -20,7 +20,7 @@ from vftcli.signals.filters import band_pass, low_pass, noise_passed
 from vftcli.signals.remarks import Remark, fact
 
 FARTHEST = 0.1  #: How far phase may lie from the clock. [s]
-#: Cutoff of the joint-space phase shift: a servo's compliance is slower. [Hz]
+#: Cutoff of the phase shift: a servo's compliance is slower. [Hz]
 PHASE_CUTOFF = 8.0
 #: A stop this long leaves all of the dry friction open. [s]
 STUCK = 0.3
@@ -107,7 +107,7 @@ class PairedRuns:
 
     @cached_property
     def torque(self) -> Array:
-        """Raw torque difference, not corrected; NaN without partner. (T, n) [N·m]"""
+        """Raw torque difference, NaN without partner. (T, n) [N·m]"""
         return self.of_free("drive_torque") - self.motion.drive_torque
 
     @cached_property
@@ -174,7 +174,7 @@ TRUSTED_SHARE = 0.5  #: Least share of samples in motion of a joint to trust.
 class ErrorModel(NamedTuple):
     """Expected error of a difference, from the logs themselves."""
 
-    sd: Array  #: Deviation of each sample, NaN without a reference. (T, n) [N·m]
+    sd: Array  #: Deviation of each sample, or NaN. (T, n) [N·m]
     standing: Mask  #: Where the joint rests in either log. (T, n)
 
     @property
@@ -228,7 +228,7 @@ class Difference(NamedTuple):
     """A two-cycle difference made on one rung."""
 
     rung: str  #: Its name in `RUNGS`.
-    cutoff: float | None  #: Cutoff of the zero-phase low-pass, None without. [Hz]
+    cutoff: float | None  #: Cutoff of the zero-phase low-pass. [Hz]
     tau: Array  #: τ_ext, NaN where there is no partner. (T, n) [N·m]
     error: ErrorModel  #: What is known of its own error.
 

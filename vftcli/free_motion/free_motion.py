@@ -60,7 +60,7 @@ class FreePart(NamedTuple):
     pieces: tuple[RunSamples, ...]  #: One a recording, the log's own first.
     own: Mask  #: RunSamples of the log itself that are free. (T,)
     remarks: tuple[Remark, ...]  #: What it is and how it was found.
-    #: Whether it was found, not named, so that it may be touched after all.
+    #: Whether it was found, not named, and may be touched.
     doubted: bool = False
 
 
@@ -203,7 +203,7 @@ class FreeMotion(Shown):
 LEAST = 0.4
 SURE = 4.0  #: SDs that it has to be.
 PARTLY = 0.8  #: Most of the free part's disturbance that it may leave.
-CUTOFF = 6.0  #: Where the disturbance is low-passed before it is weighed. [Hz]
+CUTOFF = 6.0  #: Low-pass of the disturbance. [Hz]
 RATE = 30.0  #: RunSamples a second that are weighed.
 #: The model's errors are alike for so long: one sample. [s]
 MEMORY = 0.3
@@ -238,7 +238,7 @@ class FreeLoad:
         return np.concatenate([[self.mass], self.moment])
 
     def torque(self, run: Run) -> Array:
-        """External joint torque of its weight along a recording. (T, n) [N·m]"""
+        """External joint torque of its weight. (T, n) [N·m]"""
         return handed_over(load_regressor(run.robot.chain, run.q) @ self.weights)
 
     def wrench(self, chain: Chain, q: Array) -> tuple[Array, Array]:
@@ -254,7 +254,7 @@ def without_load(run: Run, load: FreeLoad | None) -> Run:
 
 
 def with_point_mass(run: Run, weights: Array) -> Run:
-    """A run whose model carries a mass and its moment, flange axes. (4,) [kg, kg·m]"""
+    """A run whose model carries a mass and its moment. (4,) [kg, kg·m]"""
     body = Payload(mass=float(weights[0]), com=weights[1:] / weights[0])
     chain, terms = run.robot.loaded_chain, run.terms
     arms = (momentum_terms(each, run.q, run.dq) for each in (chain.with_payload(body), chain))

@@ -143,7 +143,7 @@ def links_explain(data: Training, fits: Mapping[int, JointFit]) -> Array:
 
 
 def weighted_rms(data: Training, residual: Sequence[Array]) -> Array:
-    """Weighted RMS of each joint over all logs; 0 without weight. (n,) [N·m]"""
+    """Weighted RMS of each joint over all logs. (n,) [N·m]"""
     weights = data.joined("weights")
     square = np.sum(weights * np.concatenate(residual) ** 2, axis=0)
     return np.asarray(np.sqrt(square / np.maximum(weights.sum(axis=0), 1e-12)))

@@ -82,8 +82,8 @@ class JointData(NamedTuple):
     load_spread: float  #: Spread of the gravity torque. [N·m]
     reverses: bool  #: Whether the joint moves both ways.
     speed_limit: float  #: Its friction may not fall up to this speed. [rad/s]
-    torque_limit: float = 0.0  #: The joint's largest torque, 0 if unknown. [N·m]
-    #: Torque of the profile's friction and rotor; None if not compared. (M,) [N·m]
+    torque_limit: float = 0.0  #: The joint's largest torque, or 0. [N·m]
+    #: Torque of the profile's friction and rotor. (M,) [N·m]
     profile: Array | None = None
 
     @property
@@ -290,7 +290,7 @@ def tellable_terms(terms: tuple[str, ...], data: JointData) -> tuple[str, ...]:
 
 
 def pushing_terms(shape: Shape, values: Array) -> tuple[str, ...]:
-    """Dry terms with a negative value; others may follow the coefficients. (k,)"""
+    """Dry terms with a negative coefficient. (k,)"""
     own = dict(zip(shape.terms, values, strict=False))
     return tuple(term for term in NEVER_NEGATIVE if own.get(term, 0.0) < 0.0)
 

@@ -58,7 +58,7 @@ class Triangles(NamedTuple):
     correlation: float  #: Samples that count as one: residuals correlate.
 
     def joined(self, leave_out: int | None = None) -> tuple[Array, Array]:
-        """R (size, size) and right-hand side (size,) of all stretches but one."""
+        """R (size, size), right side (size,) of all stretches but one."""
         kept = [part for k, part in enumerate(self.parts) if k != leave_out]
         whole = triangle(np.vstack(kept))
         return whole[:-1, :-1], whole[:-1, -1]
@@ -319,7 +319,7 @@ def pulled_links(
 def nearest_physical_links(
     triangles: Triangles, profile: Array, weight: float = WEIGHTS[0]
 ) -> Array:
-    """Physical parameters pulled to the profile by one of `WEIGHTS`. (size,)"""
+    """Physical parameters pulled by one of `WEIGHTS`. (size,)"""
     return next(x for pull, x in pulled_links(triangles, profile) if pull <= weight)
 
 

@@ -299,7 +299,7 @@ def whole_arm(data: Training) -> MethodResult:
 def initial_columns(
     data: Training, fits: Mapping[int, JointFit]
 ) -> tuple[ParameterColumns, Array]:
-    """The unknowns of the arm, and the profile with fitted friction. (size,)"""
+    """The unknowns, and the profile with fitted friction. (size,)"""
     chain = data.robot.loaded_chain
     shapes, values, rotor = list[Shape](), list[float](), chain.rotor_inertia.copy()
     for j, joint in enumerate(profile_friction(data.robot)):

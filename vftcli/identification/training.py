@@ -53,7 +53,7 @@ ENOUGH = 1.0  #: Least time of a joint's motion, a tenth of it each way. [s]
 
 @dataclass(frozen=True, kw_only=True)
 class PreparedLog:
-    """A log prepared for identification: M samples from first to last motion."""
+    """A prepared log: M samples from first to last motion."""
 
     recording: Recording  #: The log.
     robot: Robot  #: The arm with its model.
@@ -79,7 +79,7 @@ class PreparedLog:
         return replace(self, robot=robot, columns={})
 
     def filtered(self, signals: Array) -> Array:
-        """Signals (T, m) filtered on the log's whole clock, kept samples. (M, m)"""
+        """Kept samples of filtered signals (T, m). (M, m)"""
         return zero_phase(self.recording.t, signals, self.cutoff)[self.kept]
 
     def chunks(self) -> Iterator[slice]:
@@ -120,7 +120,7 @@ class PreparedLog:
         return torque + self.filtered(losses)
 
     def column(self, term: str, j: int, shape: Shape) -> Array:
-        """One friction term of joint j (from 0), filtered like the torque. (M,)"""
+        """One filtered friction term of joint j (from 0). (M,)"""
         # The key holds only the term's own numbers: shapes share columns.
         numbers = {
             **dict.fromkeys(("coulomb", "load_coulomb"), (shape.smoothing,)),

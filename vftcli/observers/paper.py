@@ -348,7 +348,7 @@ class KalmanObserver(BlockObserver):
         return terms.d + 0.5 * terms.dt * (one_sample_earlier(terms, "mu") - terms.mu)
 
     def first_prior(self, step: float, joints: int) -> Covariance:
-        """Covariance before the first update, stationary at a sample time [s]. (n,)"""
+        """Stationary covariance before the first update. [s] → (n,)"""
         return predict(self.steady(step, joints).posterior, self.model(step, joints))
 
     def tuning(self, step: float, joints: int) -> Tuning:

@@ -113,7 +113,7 @@ class Spectra:
 
     @property
     def floor(self) -> Array:
-        """Noise S_n from its quietest octave up, below at that octave's level. (F, n)"""
+        """Noise S_n from its quietest octave up, level below. (F, n)"""
         # At low frequencies the rest of S_n is friction and model error.
         low, levels, tops = self.width, [], []
         while 2.0 * low <= self.frequency[-1]:
@@ -136,7 +136,7 @@ class Spectra:
 
 
 def neighbour_mean(spectrum: Array) -> Array:
-    """Mean of each bin and its neighbours within ±`NEIGHBOURS` of it. (F, n)"""
+    """Mean of each bin and its `NEIGHBOURS`. (F, n)"""
     bins = np.arange(len(spectrum))
     reach = (NEIGHBOURS * bins).astype(int)
     reach = np.minimum(reach, len(spectrum) - 1 - bins)

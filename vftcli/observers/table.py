@@ -129,7 +129,7 @@ BEST = "best"  #: The most accurate estimate that a log allows.
 class LogSpectra(NamedTuple):
     """Noise and contact of a complete log, None without a free part."""
 
-    plain: "Spectra | None" = None  #: Of p and μ as the robot's model gives them.
+    plain: "Spectra | None" = None  #: Of the model's p and μ.
     best: "Spectra | None" = None  #: Of `best`'s, less the bias of the whole log.
     #: The gains from `plain`, in the form of a gains file.
     gains: Gains | None = None
@@ -234,7 +234,7 @@ def build_rts(setup: Setup, _: str) -> Built:
 
 
 def build_auto(setup: Setup, name: str) -> Built:
-    """An observer with the log's gains, else those set by hand, as densities."""
+    """An observer with the log's gains, else those set by hand."""
     from vftcli.observers.tuning import AutoTuned, tune_to_spectra
 
     spectra = setup.shown.best if name == BEST else setup.shown.plain

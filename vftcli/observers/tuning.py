@@ -150,7 +150,7 @@ class AutoTuned(Shown):
             return replace(self.observer.estimate(terms), name=self.name)
 
     def tuning(self, step: float, joints: int) -> Tuning:
-        """Meaning of the gains at a sample time, none to set if the log's. [s]"""
+        """Meaning of the gains at a sample time. [s]"""
         meaning = self.observer.tuning(step, joints)
         return meaning if self.curve is None else replace(meaning, parameter_count=0)
 
