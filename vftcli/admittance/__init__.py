@@ -41,8 +41,7 @@ class ControlChoice(Choice):
     ] = ()
     #: None for both.
     kind: Annotated[
-        str | None,
-        Option("admittance.controller", "variable|traditional", "Run one only."),
+        str | None, Option("admittance.controller", "variable|traditional", "Run one only.")
     ] = None
     #: ``sensor`` or ``file:PATH``; None for an observer's wrench.
     force: Annotated[
@@ -61,8 +60,7 @@ class ControlChoice(Choice):
     ] = None
     #: Length of a release, None until it is over. [s]
     duration: Annotated[
-        float | None,
-        Option("admittance.duration", "S", "Length of a release."),
+        float | None, Option("admittance.duration", "S", "Length of a release.")
     ] = None
     loop_torque: Annotated[
         str,

@@ -101,9 +101,7 @@ class Admittance:
 
 
 def from_table(
-    table: Mapping[str, Any],
-    robot: str,
-    settings: Mapping[str, Mapping[str, Any]],
+    table: Mapping[str, Any], robot: str, settings: Mapping[str, Mapping[str, Any]]
 ) -> Admittance:
     """Parameters of a robot file's ``[admittance]``; the user's settings go first.
 

@@ -25,13 +25,7 @@ if TYPE_CHECKING:
 else:
     __getattr__ = door(__name__, "observer", "paper")
 
-__all__ = [
-    "FilteredDynamicsObserver",
-    "KalmanObserver",
-    "MomentumObserver",
-    "Observer",
-    "Tuning",
-]
+__all__ = ["FilteredDynamicsObserver", "KalmanObserver", "MomentumObserver", "Observer", "Tuning"]
 
 #: The word for the gains of the robot's file, the paper's if it has them.
 PAPER_GAINS = "paper"
@@ -254,6 +248,5 @@ class GoalChoice(Choice):
 
     gains: Annotated[str, ObserverChoice.option("gains", reads=None)] = LOG_GAINS
     threshold: Annotated[
-        str | None,
-        Option("alarm.threshold", "NUMBER(S)", "Alarm above this torque [N·m]."),
+        str | None, Option("alarm.threshold", "NUMBER(S)", "Alarm above this torque [N·m].")
     ] = None
