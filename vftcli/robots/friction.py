@@ -26,7 +26,7 @@ References:
     Magazine 28(6), 2008, for presliding friction in drives.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from itertools import pairwise
 from typing import Any, NamedTuple
@@ -266,14 +266,13 @@ def falling_speed(friction: JointFriction, limit: float) -> float:
     return float(ends[falls].min()) if falls.any() else float("nan")
 
 
-def falling_friction(friction: Sequence[JointFriction], limits: Array) -> list[Remark]:
+def falling_friction(friction: Sequence[JointFriction], limits: Array) -> Iterator[Remark]:
     """A warning on friction that falls below the speed limits [rad/s]."""
     speeds = np.array([*map(falling_speed, friction, limits)])
     falls = np.isfinite(speeds)
-    if not falls.any():
-        return []
-    values = {"speeds_rad_s": speeds[falls], "limits_rad_s": limits[falls]}
-    return [warning("falling-friction", on_joints(falls), **values)]
+    if falls.any():
+        values = {"speeds_rad_s": speeds[falls], "limits_rad_s": limits[falls]}
+        yield warning("falling-friction", on_joints(falls), **values)
 
 
 def dry_friction(friction: Sequence[JointFriction], joints: int) -> Array:

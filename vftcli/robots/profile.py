@@ -187,26 +187,24 @@ def friction_of(joint: Section) -> JointFriction:
     law = section.vector("temperature", 4).tolist() if "temperature" in there else ()
     if why := lawless(law):
         section.refuse(why, "temperature")
+    line: dict[str, tuple[float, ...]] = {}
+    if name == "points":
+        line = {key: tuple(section.bounded(key, several(2))) for key in ("speeds", "torques")}
+        speeds, count = line["speeds"], len(line["torques"])
+        if count != len(speeds):
+            section.refuse(f"there are {count} torques for {len(speeds)} speeds", "torques")
+        if any(fast <= slow for slow, fast in itertools.pairwise(speeds)):
+            section.refuse(
+                f"speeds is {shown(list(speeds))}; each must be above the one before", "speeds"
+            )
     return JointFriction(
         model=name,
         parameters={key: section.number(key) for key in keys},
-        **(points(section) if name == "points" else {}),
+        **line,
         temperature=tuple(law),
         temperature_at=section.number("temperature_at") if "temperature_at" in there else None,
         confidence=section.text("confidence"),
     )
-
-
-def points(section: Section) -> dict[str, tuple[float, ...]]:
-    """The points of a bent line: rising speeds [rad/s] and a torque [N·m] at each."""
-    speeds, torques = (tuple(section.bounded(key, several(2))) for key in ("speeds", "torques"))
-    if len(torques) != len(speeds):
-        section.refuse(f"there are {len(torques)} torques for {len(speeds)} speeds", "torques")
-    if any(fast <= slow for slow, fast in itertools.pairwise(speeds)):
-        section.refuse(
-            f"speeds is {shown(list(speeds))}; each must be above the one before", "speeds"
-        )
-    return {"speeds": speeds, "torques": torques}
 
 
 def checked_gains(section: Section) -> dict[str, Mapping[str, Any]]:
