@@ -139,7 +139,7 @@ def paint(colour: str) -> str:
 
 
 def families_of(limits: Array) -> tuple[int, ...]:
-    """Family of each joint: neighbours of one torque limit share a drive."""
+    """Family of each joint: neighbours of one torque limit."""
     runs = groupby(limits.tolist(), lambda limit: limit if np.isfinite(limit) else None)
     return tuple(number for number, (_, run) in enumerate(runs, 1) for _ in run)
 

@@ -97,7 +97,7 @@ class Block(NamedTuple):
 
 
 def blocks(errors: pl.DataFrame | None) -> tuple[Block, ...]:
-    """One block for each recording and reference, in table order."""
+    """One block a recording and reference, in table order."""
     return () if errors is None else tuple(map(block, logs_of(errors, "joint")))
 
 
@@ -293,7 +293,7 @@ def doubts_of(errors: pl.DataFrame) -> list[str]:
 def to_terminal(
     errors: pl.DataFrame, analyses: "Sequence[Analysis]" = (), *, every: bool = True
 ) -> str:
-    """The tables of the errors as text, and what their marks mean."""
+    """The tables of the errors as text, with their marks' meaning."""
     found = blocks(errors)
     if not found:
         return "no errors to show: the estimates and the reference have no sample in common\n"

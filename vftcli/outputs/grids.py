@@ -79,7 +79,7 @@ def joints_grid(robot: "Robot") -> Grid:
 
 
 def tuned_grid(tuned: "Sequence[Tuned]", with_alarms: bool) -> Grid:
-    """Gains found for each observer, and their effects, by joint."""
+    """Gains of each observer, and their effects, by joint."""
     rows: Rows = []
     for line in tuned:
         values = {
@@ -96,7 +96,7 @@ def tuned_grid(tuned: "Sequence[Tuned]", with_alarms: bool) -> Grid:
 
 
 def robot_text(robot: "Robot") -> str:
-    """One robot in full: joints, drives, friction, gains, sources."""
+    """One robot in full."""
     lines = [
         f"{robot.title} ({robot.name}): {robot.joints} joints, torque from {robot.torque_source}",
         *("", *terminal(joints_grid(robot)).splitlines(), FRICTION),

@@ -135,7 +135,7 @@ def paper_style() -> Iterator[None]:
 
 
 def sheet(width: float, cells: int, columns: int, height: float) -> "tuple[Figure, NDArray[Any]]":
-    """A figure with room for `cells` plots; width and row height. [in]"""
+    """A figure for `cells` plots; width and row height. [in]"""
     from matplotlib.figure import Figure
 
     rows = -(-cells // columns)
@@ -337,7 +337,7 @@ def dot_figure(
 
 
 def draw_dots(axes: "Axes", plot: DotPlot, looks: Mapping[str, Look]) -> None:
-    """The dots of one log side by side at each joint, and the floor."""
+    """The dots of one log at each joint, and the floor."""
     from matplotlib.ticker import FormatStrFormatter, LogLocator, NullFormatter
 
     places = np.arange(len(plot.joints), dtype=np.float64)

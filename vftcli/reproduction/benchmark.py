@@ -155,7 +155,7 @@ class BenchmarkRun:
         logs = self.logs
         for log in logs.values():
             words: dict[str, dict[str, object]] = {"alone": {}}
-            if logs.keys() >= set(log.free_logs):
+            if all(":" in word or word in logs for word in log.free):
                 places = [str(logs[word].paths[0]) if word in logs else word for word in log.free]
                 words["free"] = {"free": places}
             if log.identified in self.robots:

@@ -136,11 +136,6 @@ class BenchmarkLog:
         beside = (Path(self.data, self.truth_file), robot if robot.suffix else Path())
         return [path for path in (*self.paths, *beside) if not path.exists()]
 
-    @property
-    def free_logs(self) -> list[str]:
-        """The logs among its free motion, by name."""
-        return [word for word in self.free if ":" not in word]
-
     def choice(self, **words: object) -> AnalysisChoice:
         """Choices of its analysis: its options, then these words."""
         own = {"frame": "base", "wrench": True, **dict(self.options), **words}
@@ -196,8 +191,9 @@ class Manifest:
         for log in names.values():
             if word := log.identified:
                 check_known(word, self.robots, f"log {log.name}: no [[robot]] {word!r}")
-            for word in log.free_logs:
-                check_known(word, names, f"log {log.name}: no free log {word!r}")
+            for word in log.free:  # a log by name, or A:B
+                if ":" not in word:
+                    check_known(word, names, f"log {log.name}: no free log {word!r}")
 
     def leaks(self, log: BenchmarkLog, protocol: str) -> Iterator[str]:
         """Reasons for unfair rows: a line a training log."""

@@ -120,19 +120,16 @@ def benchmark(robot_name: str, samples: int, rounds: int) -> dict[str, Any]:
     with one_core():
         median_times(work, 1)  # of their first calls
         total = median_times(work, rounds)
-
-    def row(name: str) -> dict[str, float]:
-        return {"total_s": total[name], "per_sample_us": total[name] / samples * 1e6}
-
+    rows = {k: {"total_s": s, "per_sample_us": s / samples * 1e6} for k, s in total.items()}
     return {
         "simd": simd(),
         "robot": robot.name,
         "samples": samples,
         "rounds": rounds,
         "observers": [
-            {"name": name, **row(name), "paper_s": PRINTED[f"seconds/{name}"]} for name in PAPER
+            {"name": name, **rows[name], "paper_s": PRINTED[f"seconds/{name}"]} for name in PAPER
         ],
-        "dynamics": row("dynamics"),
+        "dynamics": rows["dynamics"],
         "ratios": {name: total[name] / total[RNEA] for name in RATIOS if name in total},
     }
 

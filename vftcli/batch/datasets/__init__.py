@@ -176,7 +176,7 @@ def copy_others(folder: Path, partial: Path, done: Collection[Path]) -> None:
 
 
 def files_within(folder: Path) -> Iterator[tuple[Path, Path]]:
-    """Every file of a dataset: its path there, and its real path."""
+    """Every file of a dataset: its path there, its real path."""
     top = folder.resolve()
     # A hub's cache keeps the files of all snapshots once, beside these.
     tops = (top, top.parents[1] / "blobs") if top.parent.name == "snapshots" else (top,)

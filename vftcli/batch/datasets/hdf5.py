@@ -15,7 +15,7 @@ ENDINGS = (".h5", ".hdf5")  #: Names that files of episodes end with.
 
 
 def files_below(folder: Path) -> list[Path]:
-    """Files with these endings in a folder, at any depth, sorted."""
+    """Files with these endings below a folder, sorted."""
     walked = os.walk(folder, followlinks=True)
     names = [Path(place) / name for place, _, each in walked for name in each]
     return sorted(path for path in names if path.suffix.lower() in ENDINGS)

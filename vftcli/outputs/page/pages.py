@@ -193,19 +193,17 @@ def contact_details(found: ContactList) -> tuple[Grid, ...]:
 def model_pairs(found: ContactList) -> dict[str, str]:
     """The settings of a list."""
     model, prior = found.model, found.model.prior
-
-    def each(values: Array) -> str:
-        return ", ".join(map(significant, values.tolist()))
-
+    each = (model.noise_sd, model.error_sd, model.error_time)
+    noise, error, time = (", ".join(map(significant, values.tolist())) for values in each)
     pairs = {
         "basis": found.basis,
         "free motion": f"{found.free_seconds:.1f} s",
         "false contacts in it": DASH if found.false_on_free is None else str(found.false_on_free),
         "evidence asked": DASH if found.threshold is None else f"{found.threshold:.1f} nats",
         "block": f"{model.block:.3g} s",
-        "noise, joint by joint": f"{each(model.noise_sd)} N·m",
-        "model error": f"{each(model.error_sd)} N·m",
-        "its correlation time": f"{each(model.error_time)} s",
+        "noise, joint by joint": f"{noise} N·m",
+        "model error": f"{error} N·m",
+        "its correlation time": f"{time} s",
     }
     if prior is not None:
         sizes = f"{prior.force:.3g} N and {prior.moment:.3g} N·m"
