@@ -63,7 +63,7 @@ class Admittance:
     threshold: Array  #: F_tsd: above it an axis is dragged, below it recovers.
     #: ξ of (47), not in the paper; NaN: the drag phase's, B_d/(2√(M_d K_d)).
     xi: Array | float = np.nan
-    #: A dragged axis recovers below 1 − this share of the threshold.
+    #: A dragged axis recovers below 1 − this share of the threshold; the paper's is 0.
     hysteresis: Array | float = 0.0
     speed_limit: Array | float = np.inf  #: Ẋ_tsd; infinite for none.
     speed_scale: Array | float = 1.0  #: v₀ in e^{|v|/v₀}: 1 m/s and 1 rad/s.

@@ -93,7 +93,7 @@ class Recursion:
         self.turns = self.x[:, 3:].any() or self.v[:, 3:].any()
 
     def step(self, force: Array, dragged: Mask) -> None:
-        """Move one period under a force (6,) [N, N·m]; axes are `dragged` (6,) or not."""
+        """Move one period under a force (6,) [N, N·m], some axes `dragged` (6,)."""
         x, v, period = self.x, self.v, self.period
         swell = np.exp(abs(v) * self.rate) * self.alpha
         swell[:, dragged] = 1.0

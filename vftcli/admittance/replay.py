@@ -158,7 +158,7 @@ def replay_release(
     duration: float | None = None,
     anyway: bool = False,
 ) -> Replay:
-    """Motions after release at rest at `x` (6,) [m, rad] from pose `start` (n,) [rad]."""
+    """Motions after release at `x` (6,) [m, rad] from pose `start` (n,) [rad]."""
     if not x.any():
         raise ParameterError(
             "a release needs a deviation, as --release x=0.3 [m] or --release rz=0.5 [rad]"

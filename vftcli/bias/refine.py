@@ -46,7 +46,7 @@ def with_band(found: Baseline, reading: FreeReading) -> ExternalTorque:
         missed = spectra.missed(reading.observer.frequency_response(*asked))
         error = free_error(reading.samples, reading.resting, run.dry_friction)
         if called is not None and found.by_fit:
-            error = called  # the free part is these samples
+            error = called  # the free part is these samples; their loads are no error
         elif called is not None:
             # A stated part is short and often at rest: the larger of both counts.
             moving = np.maximum(error.moving, called.moving)
@@ -122,7 +122,7 @@ def friction_share(dq: Array, tau: Array) -> Array:
 
 
 def limits_remark(name: str, causes: Mapping[str, Array], stuck: Mask) -> Remark:
-    """Each joint's largest cause of error, and its part."""
+    """Each joint's largest cause of error, stiction if `stuck` (n,), and its part."""
     felt = {**causes, STICTION: np.where(stuck, causes[STICTION], 0.0)}
     sizes = np.array([*felt.values()])
     named = [list(felt)[k] for k in sizes.argmax(axis=0)]

@@ -83,7 +83,7 @@ class WholeLogBias:
     #: τ_ext of the fit's slow loads, kept in estimates, at `fitted_times`. (S, n) [N·m]
     load: Array
     remarks: tuple[Remark, ...]  #: What was applied, or why not.
-    fitted: bool = True  #: Whether there was a fit.
+    fitted: bool = True  #: Whether there was a fit; else `free` and `load` say nothing.
     #: The model's error on all joints, None without a fit.
     error: ModelError | None = field(default=None, repr=False)
 

@@ -39,13 +39,13 @@ BESIDE = 0.1  #: A cut this near may have removed a part of a row. [s]
 BENT_SHORT = 0.4
 #: Least correlation time of a contact, as a share of its length.
 OWN_TIME = 0.5
-#: A contact shorter than this [s] loses its peak below such a rate [Hz].
+#: A contact shorter than this [s] loses its peak below such a rate [Hz]: a tap lasts 50 ms.
 SHORT, SLOW = 0.25, 95.0
 #: Without known free motion a push may act for so long beyond its blocks: else its ends would
 #: be model error, and it would look smaller. On nine simulated arms 14 % of the sizes were
 #: below their bands, so 2 %. [s]
 TAIL = 0.5
-#: A contact's place comes from blocks above this share of its peak [s].
+#: A contact's place comes from blocks above this share of its peak, so near it [s].
 CORE, CORE_TIME = 0.5, 0.1
 #: SD of the moment about the point of a point force. [N·m]
 POINT_MOMENT = 1e-3
@@ -106,7 +106,7 @@ class ContactMeasurement:
 
     run: Run  #: The log with its robot's model.
     found: Candidates  #: The contacts that were kept.
-    log: BlockLog  #: The log in blocks, by contacts.
+    log: BlockLog  #: The log in blocks; under a contact joints may settle anew.
     prior: WrenchPrior  #: Prior of the contacts' wrench.
     widening: Array  #: Factor on each axis' SD that free motion asks. (6,)
     bent: float  #: Share of a peak's bend that may be hidden.

@@ -107,7 +107,7 @@ class Candidates(NamedTuple):
 
 
 def search(run: Run, noise: TorqueNoise, level: Array, seconds: float) -> Candidates:
-    """Possible contacts along a log in blocks [s], by free motion."""
+    """Possible contacts along a log in blocks [s], by free motion's noise and level."""
     blocks = disturbance_blocks(run.terms, run.q, seconds)
     options = places(run.robot.loaded_chain, blocks.q)
     flange, J = options[0].jacobian, flange_jacobian(run.robot.loaded_chain, blocks.q)

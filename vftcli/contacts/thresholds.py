@@ -46,7 +46,7 @@ def block_maxima(t: Array, level: Array) -> Array:
 
 
 def events(t: Array, level: Array) -> tuple[ContactInterval, ...]:
-    """Times of a level (T,) above 1, without the settling; NaN is not above."""
+    """Times of a level (T,) above 1, without the settling."""
     above = (np.nan_to_num(level, nan=0.0) > 1.0) & (t >= t[0] + SETTLING)
     return contact_intervals(t, above, gap=APART)
 
@@ -168,7 +168,7 @@ class SignalThreshold(NamedTuple):
 
     @property
     def level(self) -> float:
-        """The threshold of an axis or of the force's size, NaN if wide. [N, N·m]"""
+        """Threshold of an axis or the force's size, NaN if wide. [N, N·m]"""
         return float("nan") if self.is_wide else self.value
 
 
@@ -331,5 +331,5 @@ def remarks_on(free: Sequence[ComparedSignals], joints: int, rate: float) -> lis
 
 
 def worst_of(level: Array) -> Array:
-    """The largest of each sample's levels, NaN where none is known. (T,)"""
+    """The largest of each sample's levels, or NaN. (T,)"""
     return np.asarray(np.fmax.reduce(level, axis=1, initial=np.nan))

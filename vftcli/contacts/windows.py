@@ -210,7 +210,7 @@ def contact_lanes(
 
 
 def quiet_error(d: Array, process: ErrorProcess) -> tuple[Array, Array]:
-    """Mean and variance of b given the d that are not hidden. (K, …, n) each"""
+    """Mean and variance of b by the d that are not hidden. (K, …, n)"""
     mean, covariance = smoothed(error_model(d, process))
     return mean[..., 0], np.maximum(covariance[..., 0, 0], CERTAIN)
 

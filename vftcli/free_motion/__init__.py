@@ -14,7 +14,6 @@ from vftcli.signals.option import LOG, Choice, Option, interval
 
 AUTOMATIC = "auto"  #: The word for what is chosen by the log at hand.
 
-
 SPAN = re.compile(r"[-+.\d]*:[-+.\d]*")  #: Two times with a colon, in any order.
 #: Most digits of a cycle's number: 99 999 cycles of a second take a day.
 DIGITS = 5

@@ -123,7 +123,7 @@ def partners_in_logs(motion: FreeMotion) -> Partners:
 def measured_scale(
     motion: FreeMotion, pairings: Sequence[Pairing], chosen: Difference
 ) -> Array | None:
-    """Measured over expected error of two free runs, if any. (n,)"""
+    """Measured over expected error of two free runs. (n,)"""
     if len(pairings) < 2:
         return None
     if not motion.runs:

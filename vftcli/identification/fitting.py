@@ -155,8 +155,7 @@ def held_out_remarks(trace: Trace, trained: Array) -> Iterator[Remark]:
     # A load on the flange explains all joints at once.
     mass, explained = apparent_load(motion, trace.residual)
     if explained > EXPLAINS and abs(mass) > HEAVY:
-        share = 100.0 * explained
-        yield caution("apparent-load", trace.where, mass_kg=mass, share_percent=share)
+        yield caution("apparent-load", trace.where, mass_kg=mass, share_percent=100.0 * explained)
         return
     moving = np.count_nonzero((motion.weights > 0) & faster(motion.dq), axis=0) >= ENOUGH
     for j in np.flatnonzero(worse & moving).tolist():
@@ -209,7 +208,7 @@ def identify(
     held_out: Sequence[Recording] = (),
     free: Recording | None = None,
 ) -> Identification:
-    """Identify a robot from logs of free motion, a load from logs that carry it.
+    """A robot from logs of free motion, a load from logs that carry it.
 
     For a payload the logs are those that carry it, or the pair, and `free` the motion
     without it; held-out logs are only scored.

@@ -143,7 +143,7 @@ class JointsFit(NamedTuple):
 
 
 def fit_all_joints(A: Array, y: Array, usable: Array) -> JointsFit:
-    """Least squares of columns A (N, n, k) to y (N, n), weights `usable` (N, n)."""
+    """Least squares of A (N, n, k) to y (N, n), weights `usable` (N, n)."""
     left = y - y.mean(axis=0)
     for passes in range(PASSES + 1):
         w = np.sqrt(usable) / np.maximum(root_mean_squares(left), 1e-9)

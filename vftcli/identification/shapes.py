@@ -113,7 +113,7 @@ def round_digits(value: float, digits: int = 7) -> float:
 
 
 def term_values(term: str, shape: Shape, dq: Array, load: Array) -> Array:
-    """One term at recorded velocities [rad/s] and loads [N·m], its coefficient at 1."""
+    """One term at velocities [rad/s] and loads [N·m], its coefficient at 1."""
     alone = shape._replace(terms=shape.points if term in shape.points else (term,))
     friction = alone.friction(np.array([own == term for own in alone.terms], float))
     return friction_torque([friction], dq[:, None], load[:, None])[:, 0]

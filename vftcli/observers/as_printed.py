@@ -56,7 +56,7 @@ def predicted(P: Array, a12: Array, a22: Array, noise: Array) -> Array:
 
 
 def updated(prior: Array, r: Array) -> tuple[Array, Array]:
-    """The gain (2, n) for a measured momentum, and the covariance after it. (2, 2, n)"""
+    """The gain (2, n) for a momentum, and the covariance after it. (2, 2, n)"""
     gain = prior[:, 0] / (prior[0, 0] + r)
     return gain, prior - gain[:, None] * prior[0]
 

@@ -44,7 +44,7 @@ class Densities(NamedTuple):
 
 
 class Discrete(NamedTuple):
-    """A discrete two-state model, each entry of the shape (Ts, joint) broadcast.
+    """A discrete two-state model, each entry (Ts, joint).
 
     A = [[1, a12], [0, a22]], B = [Ts; 0], process noise q11, q12, q22, measurement noise r.
     """

@@ -41,4 +41,4 @@ class Observer(Protocol):
         """Meaning of the parameters at a sample time. [s]"""
 
     def frequency_response(self, frequency: Array, step: float, joints: int) -> Complex:
-        """Complex gain from external torque to estimate at `frequency` [Hz]. (F, n)"""
+        """Complex gain from torque to estimate at `frequency` [Hz]. (F, n)"""

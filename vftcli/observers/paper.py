@@ -188,7 +188,7 @@ class FilteredDynamicsObserver(FirstOrderObserver):
     def run(
         self, terms: DynamicsTerms, state: FirstOrderState | None = None
     ) -> tuple[ExternalTorque, FirstOrderState]:
-        """A block's estimate after the last block's state; None at the log's start."""
+        """A block's estimate after a state; None at the log's start."""
         if not self.as_printed:
             return self.run_corrected(terms, state, terms.d)
         d = printed_dynamics_input(terms, self.omega, begins=state is None)
@@ -227,7 +227,7 @@ class MomentumObserver(FirstOrderObserver):
     def run(
         self, terms: DynamicsTerms, state: FirstOrderState | None = None
     ) -> tuple[ExternalTorque, FirstOrderState]:
-        """A block's estimate after the last block's state; None at the log's start."""
+        """A block's estimate after a state; None at the log's start."""
         if not self.as_printed:
             return self.run_corrected(terms, state, terms.d)
         gain = self.rates(terms.joints)
@@ -289,7 +289,7 @@ class KalmanObserver(BlockObserver):
     def run(
         self, terms: DynamicsTerms, state: KalmanState | None = None
     ) -> tuple[ExternalTorque, KalmanState]:
-        """A block's estimate after the last block's state; None at the log's start."""
+        """A block's estimate after a state; None at the log's start."""
         n, step, begins = terms.joints, terms.clock.step, state is None
         d = self.unexplained(terms)
         zero, densities, settled = np.zeros((2, n)), self.densities(n), self.steady(step, n)

@@ -128,7 +128,7 @@ def from_the_end(F: Array, g: Array, d: Array, weights: Array) -> tuple[Array, A
 
 
 def gain_sequence(model: Discrete, prior: Covariance, guess: Covariance) -> Gains:
-    """Gains of a log by its samples' models, from its prior and a guess (n,). (T, n)"""
+    """Gains of a log by its samples' models, a prior and a guess. (T, n)"""
     first = update(prior, model.r[0])
     rows = [np.array(first)[:, None]]
     entering = first.posterior

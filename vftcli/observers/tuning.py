@@ -116,7 +116,7 @@ def bound_remarks(name: str, rate: Array, grid: Array) -> tuple[Remark, ...]:
 
 
 def noise_level(omega_n: Array, spectra: Spectra) -> Array:
-    """R at which the innovations have the variance that the filter expects. (n,)
+    """R at which the innovations have their expected variance. (n,)
 
     Gains depend on Q/R alone. The innovation is the estimate's jump, ν = (τ̂ᵗ − τ̂ᵗ⁻¹)/L₂:
     its variance follows from S_d. No filter runs on R = 0: it is at least `LEAST_SHARE` of
