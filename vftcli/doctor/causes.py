@@ -214,6 +214,8 @@ def tilted(case: Case) -> Iterator[Cause]:
 def turned_or_swapped(case: Case) -> Iterator[Cause]:
     """Single joints with a reversed effort, pairs with exchanged efforts."""
     moving = case.windows.moves
+    if case.gravity_range < RANGE:  # at rest friction has any sign
+        moving &= case.windows.ways.sum(axis=0) >= FORTH_AND_BACK
     suspects = np.flatnonzero((case.by_joint > SUSPECT) & moving).tolist()
     if not suspects:
         return
