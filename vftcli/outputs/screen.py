@@ -347,9 +347,9 @@ def seconds(t: Array, columns: int) -> str:
     raw = span / LABELS
     decade = 10.0 ** np.floor(np.log10(raw)) if raw > 0 else 1.0
     step = next(decade * m for m in (1, 2, 5, 10) if decade * m >= raw)
-    each = [k * step for k in range(int(np.floor(span / step + 1e-9)) + 1)]
+    each = step * np.arange(np.ceil(t[0] / step - 1e-9) + 0.0, t[-1] / step + 1e-9)
     share = columns / max(span, 1e-9)
-    texts = ((round(x * share), f"{t[0] + x:g}") for x in each)
+    texts = ((round((x - t[0]) * share), f"{x:g}") for x in each.tolist())
     # The last one and its unit end where the screen does.
     return (
         placed(((min(at, columns + 2 - len(text)), text) for at, text in texts), columns) + " s"
