@@ -95,7 +95,7 @@ class Contact(Shown):
     #: |F| by the log's own wrench at the peak. [N]
     sensor_force: float | None = None
     course: ForceCourse | None = None  #: |F| from start to end, or None.
-    #: Whether nothing known checks its size.
+    #: Whether neither free motion nor a reference checks its size.
     inferred: bool = False
     remarks: tuple[Remark, ...] = ()  #: Limits of this row.
 
