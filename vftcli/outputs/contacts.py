@@ -41,15 +41,18 @@ LEGEND = (
 FRAME, SIGN = "base axes, moment about the flange point", "on the robot"
 
 
-def otherwise(found: ContactList) -> str:
-    """A sentence on the rest of the log; "" if no force is known."""
+def otherwise(found: ContactList, *, every: bool = False) -> str:
+    """A sentence on the rest of the log; "" if no force is known.
+
+    Where `every` row is shown nothing points to the candidates.
+    """
     least = found.detectable_force
     if found.smallest_force is None or any(c.is_load for c in found.contacts):
         return ""
     if least is None:
         return "A push along one axis may go unseen: the pose hardly shows it."
     if not found.tells_untouched:
-        others = found.candidates
+        others = () if every else found.candidates
         more = f" {counted(len(others), 'candidate')}: contacts --all." if others else ""
         long = "" if found.basis == "free motion" else ", or through half of the log,"
         return f"Flange pushes below {at_least_shown(least)}{long} may not show.{more}"
