@@ -244,13 +244,13 @@ def test_a_file_fits_a_few_screens() -> None:
 
 
 MOST = {
-    "lines of Python": 50_641,
-    "files": 210,
-    "functions": 2700,
-    "functions over 60 lines": 8,
-    "names, operators, numbers": 363_739,
-    "characters a line that is not blank": 50.10,
-    "noqa": 70,
+    "lines of Python": 49_583,
+    "files": 205,
+    "functions": 2625,
+    "functions over 60 lines": 7,
+    "names, operators, numbers": 362_323,
+    "characters a line that is not blank": 50.03,
+    "noqa": 69,
     "lines of TOML, JavaScript, CSS": 7258,
 }
 """The size of the package: whoever makes it smaller lowers these, nobody raises them."""
