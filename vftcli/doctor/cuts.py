@@ -61,8 +61,7 @@ class Bad(NamedTuple):
     most: float = SHARE  #: Most of the log to cut for it. [1]
 
 
-#: The sample before each change of position beyond the velocities (K,), sizes (K, n) [rad],
-#: and the jumps among them (K, n).
+#: Sample before each change of position (K,), sizes [rad] and jumps (K, n).
 Slips = tuple[Indices, Array, Mask]
 
 
@@ -156,8 +155,8 @@ def isolated(x: Array, away: Array, step: float) -> Mask:
         steps = np.flatnonzero(change > 0.5 * away[j])
         if not steps.size:
             continue
-        near = np.unique(steps[:, None] + np.arange(-FEW + 1, FEW + 1))
-        near = near[(near >= 0) & (near < len(x))]
+        near = np.clip(steps[:, None] + np.arange(1 - FEW, FEW + 1), 0, len(x) - 1)
+        near = np.unique(near)
         around = np.clip(near[:, None] + np.arange(-4, 5), 0, len(x) - 1)
         noise = FAR * median(change) / (0.6745 * np.sqrt(2.0))
         off = abs(column[near] - np.median(column[around], axis=1))

@@ -8,7 +8,6 @@ A row without overlap is false if its middle lies in a vouched span.
 """
 
 from collections.abc import Mapping, Sequence
-from math import sqrt
 from typing import Any, NamedTuple, Self
 
 import numpy as np
@@ -232,5 +231,5 @@ def share_interval(part: int, whole: int) -> tuple[float, float]:
         return np.nan, np.nan
     share, extra = part / whole, NORMAL**2 / whole
     centre = share + 0.5 * extra
-    half = NORMAL * sqrt(share * (1.0 - share) / whole + 0.25 * extra / whole)
+    half = NORMAL * ((share * (1.0 - share) + 0.25 * extra) / whole) ** 0.5
     return max(centre - half, 0.0) / (1.0 + extra), (centre + half) / (1.0 + extra)

@@ -41,7 +41,7 @@ LEGEND = (
 FRAME, SIGN = "base axes, moment about the flange point", "on the robot"
 
 
-def otherwise(found: ContactList, *, every: bool = False) -> str:
+def otherwise(found: ContactList, every: bool = False) -> str:
     """A sentence on the rest of the log; "" if no force is known.
 
     Where `every` row is shown nothing points to the candidates.

@@ -181,7 +181,7 @@ def written_lines(
 
 def list_lines(found: ContactList, most: int | None, canvas: Canvas) -> list[str]:
     """The rows of a list, and the rest of its log."""
-    contacts, rest = found.contacts, otherwise(found, every=most is None)
+    contacts, rest = found.contacts, otherwise(found, most is None)
     if not contacts and (most is not None or not found.candidates):
         return [f"  {rest}"] if rest else []
     shown = hardest_rows(contacts, len(contacts) if most is None else most)

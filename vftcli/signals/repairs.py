@@ -31,10 +31,7 @@ RATE = 50.0  #: Rate from which velocities are derived unasked. [Hz]
 
 
 def with_velocity(recording: Recording, slowest: float = 0.0) -> Recording:
-    """A log with velocities derived from its positions, if it has none.
-
-    A log below the rate `slowest` [Hz] gets none.
-    """
+    """A log with velocities from its positions, unless slower than `slowest`. [Hz]"""
     if recording.dq is not None or recording.samples < 3:
         return recording
     if recording.median_step * slowest > 1.001:

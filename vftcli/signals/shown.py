@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, is_dataclass
+from functools import partial
 from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar, dataclass_transform
@@ -23,10 +24,13 @@ UNKNOWN = "–"  #: The text for a number that is not known.
 Kind = TypeVar("Kind")
 
 
-@dataclass_transform(frozen_default=True, kw_only_default=True, field_specifiers=(field,))
-def record(kind: type[Kind]) -> type[Kind]:
-    """The class as a frozen dataclass of named fields, with the `repr` of `Shown`."""
-    return dataclass(frozen=True, kw_only=True, repr=False)(kind)
+if TYPE_CHECKING:
+
+    @dataclass_transform(frozen_default=True, kw_only_default=True, field_specifiers=(field,))
+    def record(kind: type[Kind]) -> type[Kind]:
+        """The class as a frozen dataclass of named fields, with the `repr` of `Shown`."""
+else:
+    record = partial(dataclass, frozen=True, kw_only=True, repr=False)
 
 
 class Shown:
