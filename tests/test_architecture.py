@@ -244,11 +244,11 @@ def test_a_file_fits_a_few_screens() -> None:
 
 
 MOST = {
-    "lines of Python": 49_582,
+    "lines of Python": 49_580,
     "files": 205,
     "functions": 2625,
     "functions over 60 lines": 7,
-    "names, operators, numbers": 362_322,
+    "names, operators, numbers": 362_320,
     "characters a line that is not blank": 50.03,
     "noqa": 69,
     "lines of TOML, JavaScript, CSS": 7258,

@@ -336,6 +336,20 @@ def test_a_simulated_log_is_checked_against_the_truth_beside_it(ran, refused) ->
     assert "looks touched" in err
 
 
+def test_a_simulated_log_is_a_table_where_its_name_says_so(ran, tmp_path) -> None:
+    out, _ = ran(
+        "simulate",
+        "panda-bearing",
+        "--set",
+        "duration=2",
+        "-o",
+        tmp_path / "log.parquet",
+        "--json",
+    )
+    assert json.loads(out)["format"] == "parquet"
+    assert (tmp_path / "log.parquet").read_bytes().startswith(b"PAR1")
+
+
 FREE = "free_10harm.csv.gz free_12harm.csv free_12harm_40s.csv.gz free_14harm.csv jointwise_2.csv"
 REPEATS = "jointwise_4.csv free_repeat_a.csv free_repeat_b.csv free_repeat_c.csv"
 UR10E = ("--robot", "ur10e", "--columns", "t,q:6,dq:6,current:6,target_current:6,target_torque:6")

@@ -87,7 +87,7 @@ def simulate_log(
     """Simulate an experiment, with its true forces.
 
     The true forces go beside the log, as PATH.truth.parquet. The settings are the scenario's keys,
-    as duration=8. Without --as, a UR writes rtde, a Franka arm libfranka, any other arm parquet.
+    as duration=8. Without --as, PATH.parquet is a table, a UR writes rtde, a Franka arm libfranka.
 
     Example: vftcli simulate ur5-circle -o log.csv --seed 2
     """
@@ -108,6 +108,7 @@ def simulate_log(
         return
     if output is None:
         raise typer.BadParameter("-o PATH says where the log goes")
+    log_format = log_format or "parquet" * (output.suffix == ".parquet")
     check_installed("pinocchio", "vftcli simulate")
     setup = load_scenario(scenario, changes or ())
     paths = [output]

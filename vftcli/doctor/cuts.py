@@ -155,8 +155,7 @@ def isolated(x: Array, away: Array, step: float) -> Mask:
         steps = np.flatnonzero(change > 0.5 * away[j])
         if not steps.size:
             continue
-        near = np.clip(steps[:, None] + np.arange(1 - FEW, FEW + 1), 0, len(x) - 1)
-        near = np.unique(near)
+        near = np.unique(np.clip(steps[:, None] + np.arange(1 - FEW, FEW + 1), 0, len(x) - 1))
         around = np.clip(near[:, None] + np.arange(-4, 5), 0, len(x) - 1)
         noise = FAR * median(change) / (0.6745 * np.sqrt(2.0))
         off = abs(column[near] - np.median(column[around], axis=1))
@@ -174,7 +173,7 @@ def not_followed(recording: Recording, slips: Slips) -> Mask:
     width = min(max(round(WHILE / step), 4), (len(t) - 1) // 3)
     at, _, jumps = slips
     span = t[width:] - t[:-width]
-    even = abs(span - width * step) < 0.5 * width * step
+    late = abs(span - width * step)
     for j in np.flatnonzero([abs(np.diff(column)).max() > JUMP for column in dq.T]):
         moved = (q[width:, j] - q[:-width, j]) / span
         total = summed(0.5 * (dq[1:, j] + dq[:-1, j]) * np.diff(t))
@@ -182,9 +181,10 @@ def not_followed(recording: Recording, slips: Slips) -> Mask:
         # Stamps may be off by a step, and a velocity late.
         around = np.pad(moved, width, mode="edge")
         turn = abs(around[2 * width :] - around[: -2 * width])
-        slack = ASTRAY + (abs(moved) * (step + abs(span - width * step)) + LAG * turn) / span
-        bad = even & (off > np.maximum(slack, FAR / 0.6745 * median(off)))
-        for k in at[jumps[:, j]].tolist():
+        slack = ASTRAY + (abs(moved) * (step + late) + LAG * turn) / span
+        bad = off > np.maximum(slack, FAR / 0.6745 * median(off))
+        bad &= late < 0.5 * width * step
+        for k in at[jumps[:, j]]:
             bad[max(k - width, 0) : k + 1] = False
         for start, stop in runs_of(bad):
             some = slice(start, stop + width)

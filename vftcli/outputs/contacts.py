@@ -42,18 +42,15 @@ FRAME, SIGN = "base axes, moment about the flange point", "on the robot"
 
 
 def otherwise(found: ContactList, every: bool = False) -> str:
-    """A sentence on the rest of the log; "" if no force is known.
-
-    Where `every` row is shown nothing points to the candidates.
-    """
+    """A sentence on the rest of the log, or ""; whether `every` row is shown."""
     least = found.detectable_force
     if found.smallest_force is None or any(c.is_load for c in found.contacts):
         return ""
     if least is None:
         return "A push along one axis may go unseen: the pose hardly shows it."
     if not found.tells_untouched:
-        others = () if every else found.candidates
-        more = f" {counted(len(others), 'candidate')}: contacts --all." if others else ""
+        count = 0 if every else len(found.candidates)
+        more = f" {counted(count, 'candidate')}: contacts --all." if count else ""
         long = "" if found.basis == "free motion" else ", or through half of the log,"
         return f"Flange pushes below {at_least_shown(least)}{long} may not show.{more}"
     rest = f"Nothing{' else' * bool(found.contacts)} above {at_least_shown(least)} at the flange"
