@@ -167,7 +167,7 @@ def isolated(x: Array, away: Array, step: float) -> Mask:
 
 
 def not_followed(recording: Recording, slips: Slips) -> Mask:
-    """Velocities with jumps that the positions do not follow over `WHILE`. (T, n)"""
+    """Velocities with jumps that positions do not follow. (T, n)"""
     t, q, step = recording.t, recording.q, recording.median_step
     dq, found = recording.require("dq"), np.zeros(q.shape, bool)
     width = min(max(round(WHILE / step), 4), (len(t) - 1) // 3)
