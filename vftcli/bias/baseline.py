@@ -30,7 +30,7 @@ STANDS = 0.5  #: Stiction limits a joint at rest for more than this share.
 class Baseline:
     """Evidence of a log before any observer runs."""
 
-    motion: FreeMotion  #: The log and its free motion, steadied.
+    motion: FreeMotion  #: The log and its free motion, less samples that stand alone.
     part: FreePart | None = None  #: Its free part, None where there is none.
     #: Of the raw disturbance; None where the free part is short.
     spectra: Spectra | None = None
@@ -47,7 +47,7 @@ class Baseline:
     _made: dict[Run, Run] = field(init=False, repr=False, compare=False, default_factory=dict)
 
     def of(self, run: Run) -> Run:
-        """The log or a free run as the observers have it, steadied. Made once."""
+        """The log or a free run as the observers have it, made once."""
         if not self.on_correction:
             return run
         run = run.steadied
@@ -59,7 +59,7 @@ class Baseline:
         return self._made[run]
 
     def spare(self) -> None:
-        """Let go of what the observers ran on, of a long log."""
+        """Free what the observers ran on, of a long log."""
         if self.motion.log.recording.samples > LONG:
             self._made.clear()
 

@@ -102,7 +102,7 @@ def renewed(words: list[str], options: Container[str]) -> tuple[list[str], list[
                 arguments.append(value.replace("=", ":=", 1))
             else:
                 found.extend(each.replace("VALUE", value) for each in now.split())
-    if arguments:  # of a xacro, whose robot the words must name
+    if arguments:  # of a xacro: the words must name its robot
         given, pairs = " ".join(arguments), enumerate(pairwise(["", *found]))
         robots = [k for k, (a, b) in pairs if a == "--robot" or b.startswith("--robot=")]
         if not robots:

@@ -279,7 +279,7 @@ def choice_for(
     on_screen: bool = False,
     observers: ObserverChoice | None = None,
 ) -> "AnalysisChoice":
-    """The choice of a command, whose examiner prints."""
+    """The choice of a command; its examiner prints."""
     from vftcli.pipeline import choice_of
 
     if "observer" in asked.words:

@@ -78,7 +78,7 @@ class PointFit(NamedTuple):
     share: float  #: Share along the link, from its joint (0) to the next (1).
     misfit: float  #: χ² of the torque that is left.
     score: float  #: χ² and what the size of the force costs.
-    size: float  #: |F|. [N]
+    size: float  #: Size of the force. [N]
     force: Array  #: The force in base axes. (3,) [N]
     band: float  #: Half width of the 95 % band of its size. [N]
 
@@ -122,7 +122,7 @@ FORCES, MOMENTS = ((3.0, 300.0), (0.1, 50.0))
 #: Evidence over nothing, which may spike. [nats] In 299 s of real free motion one
 #: reversal had 15, all else but abrupt stops below 6.
 LEAST_EVIDENCE = 12.0
-#: The same in motion that nobody named free. [nats] Model errors reach 82 on six arms.
+#: In motion that nobody named free. [nats] Errors reach 82 on six arms; 75 to 200 do alike.
 LEAST_IN_MOTION = 120.0
 LEAST_FORCE = 10.0  #: Smallest SD of a force that is tried. [N]
 LONGEST_TIME = 1.0  #: Longest correlation time of a moving wrench. [s]

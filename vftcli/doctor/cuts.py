@@ -118,7 +118,7 @@ def rules(recording: Recording, robot: Robot) -> Iterator[Bad]:
     slips = slips_of(recording)
     yield from position_jumps(recording, frozen, slips)
     fast = FAST * np.nan_to_num(robot.limits.qd_max, nan=2.0)
-    alone = isolated(dq, fast, step) | not_followed(recording, slips)
+    alone = isolated(dq, fast, step) | contradicted_velocities(recording, slips)
     yield Bad("isolated-velocity", alone, dq)
     name = effort_name(recording, robot)
     effort: Array | None = getattr(recording, name)
@@ -166,8 +166,8 @@ def isolated(x: Array, away: Array, step: float) -> Mask:
     return found
 
 
-def not_followed(recording: Recording, slips: Slips) -> Mask:
-    """Velocities with jumps that positions do not follow. (T, n)"""
+def contradicted_velocities(recording: Recording, slips: Slips) -> Mask:
+    """Velocities that jump where positions do not. (T, n)"""
     t, q, step = recording.t, recording.q, recording.median_step
     dq, found = recording.require("dq"), np.zeros(q.shape, bool)
     width = min(max(round(WHILE / step), 4), (len(t) - 1) // 3)

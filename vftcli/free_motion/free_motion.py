@@ -249,12 +249,12 @@ class FreeLoad:
 
 
 def without_load(run: Run, load: FreeLoad | None) -> Run:
-    """A run whose model carries a load; itself without one."""
+    """A run with a load in its model; itself without one."""
     return run if load is None else with_point_mass(run, load.weights)
 
 
 def with_point_mass(run: Run, weights: Array) -> Run:
-    """A run whose model carries a mass and its moment. (4,) [kg, kg·m]"""
+    """A run with a mass and its moment in its model. (4,) [kg, kg·m]"""
     body = Payload(mass=float(weights[0]), com=weights[1:] / weights[0])
     chain, terms = run.robot.loaded_chain, run.terms
     arms = (momentum_terms(each, run.q, run.dq) for each in (chain.with_payload(body), chain))

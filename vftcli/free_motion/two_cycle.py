@@ -26,7 +26,7 @@ from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.remarks import Remark, Where, caution, fact, on_joints
 from vftcli.signals.rest import REST, faster
 
-BLOCK = 1.0  #: Length of pieces whose scatter shows chance. [s]
+BLOCK = 1.0  #: Length of pieces; their scatter is chance. [s]
 #: Standard errors of a change that is believed.
 SURE = 3.0
 

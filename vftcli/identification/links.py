@@ -33,7 +33,7 @@ REWEIGHTINGS = 3  #: Passes of reweighting.
 #: Singular values below this share of the largest stay at the start.
 TRUNCATION = 1e-3
 PROBES = 400  #: Random states for the structure of base parameters.
-#: Entries of R's diagonal below this share of the largest are zero.
+#: Entries of R's diagonal below this share of the largest are zero; rounding has 1e-15.
 RANK_TOLERANCE = 1e-8
 #: Least relative deviation of an undetermined parameter.
 DOUBTFUL = 0.3

@@ -73,7 +73,7 @@ class LoadFit(NamedTuple):
     origin: Remark  #: Its source and method.
 
     def carried_by(self, recording: Recording) -> bool:
-        """Whether a log carries it, as an object: names may be equal."""
+        """Whether a log is one that carries it; names may be equal."""
         return any(log is recording for log in self.loaded)
 
 

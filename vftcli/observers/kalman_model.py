@@ -142,7 +142,7 @@ class KalmanState(NamedTuple):
     """State of a Kalman observer after a block of a log."""
 
     error: Array  #: e = p − p̂ [kg·m²/s] and τ̂ [N·m]. (2, n)
-    posterior: Array  #: Their covariance's entries. (3, n) or (2, 2, n)
+    posterior: Array  #: Their covariance's entries. (3, n); (2, 2, n) of (44) as printed
 
 
 def steady(model: Discrete, decay: Array) -> Gains:

@@ -42,7 +42,7 @@ FRAME, SIGN = "base axes, moment about the flange point", "on the robot"
 
 
 def otherwise(found: ContactList, every: bool = False) -> str:
-    """A sentence on the rest of the log, or ""; whether `every` row is shown."""
+    """A sentence on the rest of the log, or ""; no hint where `every` row is shown."""
     least = found.detectable_force
     if found.smallest_force is None or any(c.is_load for c in found.contacts):
         return ""

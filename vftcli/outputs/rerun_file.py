@@ -56,7 +56,7 @@ class ArmPoses(NamedTuple):
 
 
 def rgba(*colours: str) -> Packed:
-    """Colours as 0xRRGGBBAA: [r, g, b] is three colours to Rerun."""
+    """Colours as 0xRRGGBBAA: [r, g, b] is three colours to Rerun 0.30."""
     return np.array([int(f"{colour[1:]}ff", 16) for colour in colours], dtype=np.uint32)
 
 

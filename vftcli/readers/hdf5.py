@@ -135,7 +135,7 @@ def table_of(path: Path, content: Hdf5, fewest_rows: int = 2) -> Hdf5Table:
     return Hdf5Table(path, dict(sorted(found.items(), key=lambda item: natural(item[0]))))
 
 
-ALOHA_RATE = 50.0  #: ALOHA's recorder stores no clock. [Hz]
+ALOHA_RATE = 50.0  #: ALOHA's recorder steps by 0.02 s and stores no clock. [Hz]
 ALOHA_WIDTH, ALOHA_ARM = 14, 7  #: Two arms of six joints, a gripper behind each.
 #: ALOHA's positions and efforts.
 ALOHA, DYNAMIXEL = "observations/qpos", "observations/effort"

@@ -44,7 +44,7 @@ def table_at(path: Path) -> Table:
 
 
 def program_log(table: Table, picks: Picks, choice: ReadChoice) -> RawLog:
-    """The log of a table that a program made, whose clock must be whole. [s]"""
+    """The log of a table that a program made; its clock must be whole. [s]"""
     raw = load_signals(table, picks, choice)
     t = np.asarray(raw.stamps, dtype=np.float64) * raw.tick
     check_clock(t, str(table.path))

@@ -151,7 +151,7 @@ LIGHTEST = 0.05
 
 
 def out_of_bounds(key: str, values: Sequence[float]) -> str:
-    """Say which number no robot has, or "" if all may be."""
+    """Complaint about a number that no robot has, or ""."""
     return BOUNDS.get(key, UNNAMED).broken(key, values)
 
 

@@ -31,7 +31,7 @@ RATE = 50.0  #: Rate from which velocities are derived unasked. [Hz]
 
 
 def with_velocity(recording: Recording, slowest: float = 0.0) -> Recording:
-    """A log with velocities from its positions, unless slower than `slowest`. [Hz]"""
+    """A log with velocities, derived if it has none and is as fast as `slowest`. [Hz]"""
     if recording.dq is not None or recording.samples < 3:
         return recording
     if recording.median_step * slowest > 1.001:
@@ -56,7 +56,7 @@ def derived_velocity(recording: Recording) -> tuple[Array, float]:
 NEAR = 2
 #: Quantile of usual bends, 2.7 sd of white noise: 1 % of bad samples make 3 % of bad bends.
 USUAL = 0.97
-#: A sample this far off is alone: 16 sd of white noise. 24 of 36 sound logs have none.
+#: A sample this far off is alone: 16 sd of white noise. 24 of 36 sound logs have none, one 11.
 FAR = 6.0
 #: And beyond this share of what a velocity or effort spans without its outer hundredths.
 SPREAD = 0.03
