@@ -172,11 +172,11 @@ def test_trust_says_why(changed, words):
     ({"smallest_force": None}, ""),
     ({"smallest_force": np.inf}, "A push along one axis may go unseen: the pose hardly shows it."),
     ({"basis": "whole log", "contacts": (contact(),)},
-     "Flange pushes below 6 N, or through half of the log, may not show."),
+     "Flange pushes below 6 N, and some harder or lasting ones, may not show."),
     ({"candidates": (contact(),)},
      "Flange pushes below 6 N may not show. 1 candidate: contacts --all."),
     ({"candidates": (contact(), contact(number=2)), "basis": "friction"},
-     "Flange pushes below 6 N, or through half of the log, may not show. 2 candidates: "
+     "Flange pushes below 6 N, and some harder or lasting ones, may not show. 2 candidates: "
      "contacts --all."),
     ({"smallest_force": 3473.0}, "A push along one axis may go unseen: the pose hardly shows it."),
 ])  # fmt: skip

@@ -130,7 +130,7 @@ def rules(recording: Recording, robot: Robot) -> Iterator[Bad]:
         stuck[first + 1 : last + 1, j] = True
     for start, stop in runs_of(frozen_rows(recording, (name,))):
         stuck[start:stop] |= np.ptp(recording.q[start:stop], axis=0).max() > WAY
-    # Of one joint a finding is enough; of most that move nothing can be estimated.
+    # Of one joint a finding is enough; of most nothing can be estimated.
     moving = np.count_nonzero(travel_of(recording) > WAY)
     most = stuck.sum(axis=1) > moving / 2
     yield Bad("frozen-effort", stuck & most[:, None], None, MOST)
@@ -290,7 +290,7 @@ def position_jumps(recording: Recording, frozen: Mask, changes: Slips) -> Iterat
         slack = SLIPPED + np.ptp(speeds, axis=0) * lasts
         slack += abs(speeds).sum(axis=0) * max(recording.median_step, LATE)
         if last - first > 1 and (abs(over) < slack)[joints].all():
-            span, into = slice(first + 1, last), rows  # a few bad rows, then the motion continues
+            span, into = slice(first + 1, last), rows  # a few bad rows
         else:
             span, into = slice(*t.searchsorted([t[first] - APART, t[last] + APART])), meets
         into[span, joints], sizes[span, joints] = True, size[joints]

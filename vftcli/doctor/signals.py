@@ -67,7 +67,7 @@ def unusable_findings(recording: Recording) -> Iterator[Remark]:
 
 
 def signal_findings(recording: Recording) -> Iterator[Remark]:
-    """Signals that are missing, of odd units or interpolated, each check independent."""
+    """Signals that are missing, of odd units or interpolated."""
     if recording.dq is None:
         yield warning("no-velocity")
     if not efforts_of(recording):

@@ -51,7 +51,7 @@ def otherwise(found: ContactList, every: bool = False) -> str:
     if not found.tells_untouched:
         count = 0 if every else len(found.candidates)
         more = f" {counted(count, 'candidate')}: contacts --all." if count else ""
-        long = "" if found.basis == "free motion" else ", or through half of the log,"
+        long = "" if found.basis == "free motion" else ", and some harder or lasting ones,"
         return f"Flange pushes below {at_least_shown(least)}{long} may not show.{more}"
     rest = f"Nothing{' else' * bool(found.contacts)} above {at_least_shown(least)} at the flange"
     if any((c.peak_force or least) < least for c in found.contacts):

@@ -43,7 +43,7 @@ def with_velocity(recording: Recording, slowest: float = 0.0) -> Recording:
 
 
 def derived_velocity(recording: Recording) -> tuple[Array, float]:
-    """The gradient of q on the log's own stamps, low-passed both ways, and the cutoff. [Hz]"""
+    """The low-passed gradient of q on the log's own stamps, and the cutoff. [Hz]"""
     cutoff = min(CUTOFF, OF_NYQUIST * 0.5 / recording.median_step)
     # Endless joints logged within one turn jump; a motor's count does not.
     within = np.ptp(recording.q, axis=0) < ONE_TURN

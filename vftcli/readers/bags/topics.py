@@ -170,7 +170,7 @@ class Gathering:
         """Whether a signal of another topic was interpolated at the leading times."""
         lead, topic = self.lead, stream.topic
         times, own, values = lead.host, stream.host, stream.signals[signal]
-        # One of the two may have receive stamps only: like is compared with like.
+        # One of the two may have receive stamps only.
         if (times is lead.receive) != (own is stream.receive):
             times, own = lead.receive, stream.receive
         if signal != "wrench":
