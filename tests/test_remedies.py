@@ -236,7 +236,7 @@ ROWS = [
     Row("velocity-unit", of(velocities_in_degrees), "columns", "dq[deg/s]=dq{i}"),
     Row("velocity-order", planted("velocity_swapped_J2_J3"), "columns", one_by_one("dq", SWAPPED)),
     Row("time-unit", planted("time_ms"), "columns"),
-    Row("stuck-position", planted("stuck_position_J4"), "interval", "0:10"),
+    Row("stuck-position", of(partial(stuck, signal="q", joint=4, start=0.4)), "interval", "0:6"),
     Row("stuck-velocity", of(partial(stuck, signal="dq", joint=2)), "interval", "0:10"),
     Row("stuck-effort", planted("stuck_effort_J3"), "interval", "0:10"),
     Row("saturation", planted("saturated_J2"), "interval", "0:1"),

@@ -98,6 +98,7 @@ def examined(recording: Recording) -> tuple[Recording, dict[str, Any]]:
         (changed("q", 9999, lambda x: x + 0.05, 3), "position-jump", 64, (3,)),
         (glued, "position-jump", 64, None),
         (frozen, "frozen-rows", 374, None),
+        (changed("q", 375, lambda x: 0 * x + x[0], 3), "frozen-position", 374, (3,)),
         # Three seconds: of all joints at once nothing else is asked but that the arm moves.
         (
             changed("current", 375, lambda x: 0 * x + x[0]),

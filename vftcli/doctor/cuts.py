@@ -115,8 +115,10 @@ def rules(recording: Recording, robot: Robot) -> Iterator[Bad]:
     dq, step = recording.require("dq"), recording.median_step
     frozen = frozen_rows(recording, ("q", "dq", *EFFORTS))
     yield Bad("frozen-rows", frozen[:, None], None, MOST)
+    held = stuck_samples(recording, "q")
+    yield Bad("frozen-position", held, None, MOST)
     slips = slips_of(recording)
-    yield from position_jumps(recording, frozen, slips)
+    yield from position_jumps(recording, frozen | held.any(axis=1), slips)
     fast = FAST * np.nan_to_num(robot.limits.qd_max, nan=2.0)
     alone = isolated(dq, fast, step) | contradicted_velocities(recording, slips)
     yield Bad("isolated-velocity", alone, dq)
@@ -125,9 +127,7 @@ def rules(recording: Recording, robot: Robot) -> Iterator[Bad]:
     constant = np.ones(robot.joints) if name != "current" else robot.torque_constant
     if effort is None or constant is None:
         return
-    stuck = np.zeros(effort.shape, bool)
-    for j, first, last in stuck_stretches(recording, name):
-        stuck[first + 1 : last + 1, j] = True
+    stuck = stuck_samples(recording, name)
     for start, stop in runs_of(frozen_rows(recording, (name,))):
         stuck[start:stop] |= np.ptp(recording.q[start:stop], axis=0).max() > WAY
     # Of one joint a finding is enough; of most nothing can be estimated.
@@ -219,6 +219,14 @@ def zero_bursts(torque: Array, least: Array) -> Mask:
             enough = stop - start >= FEW or every[start:stop].all()
             if start and stop < len(zero) and enough:
                 found[start:stop, j] = abs(torque[[start - 1, stop], j]).min() > least[j]
+    return found
+
+
+def stuck_samples(recording: Recording, name: str) -> Mask:
+    """Samples in which a joint's signal wrongly repeats itself. (T, n)"""
+    found = np.zeros(recording.q.shape, bool)
+    for j, first, last in stuck_stretches(recording, name):
+        found[first + 1 : last + 1, j] = True
     return found
 
 
