@@ -42,12 +42,13 @@ SUBJECTS = {
              "payload-not-carried", "load-changes"),
     "robot": ("other-robot", "no-robot-fits", "no-robot-fits-any", "no-profile"),
     "time stamps": ("time-unit", "clock-rate", "slow-rate", "gaps", "repeated-stamps",
-                    "clock-gaps", "repeats-differ", "absurd-clock", "absurd-steps"),
+                    "clock-gaps", "repeats-differ", "absurd-clock", "absurd-steps", "frozen-rows"),
     "base": ("upside-down", "tilted-base"),
-    "positions": ("degrees", "stuck-position", "coarse-positions", "absurd-values"),
+    "positions": ("degrees", "stuck-position", "coarse-positions", "absurd-values",
+                  "frozen-position", "position-slip", "position-jump"),
     "velocity": ("no-velocity", "velocity-unit", "velocity-mismatch", "velocity-sign",
                  "velocity-order", "velocity-lag", "velocity-filtered", "velocity-held",
-                 "velocity-of-another-kind", "stuck-velocity", "zero-dq"),
+                 "velocity-of-another-kind", "stuck-velocity", "zero-dq", "isolated-velocity"),
     "temperature": ("far-temperature", "far-temperature-assumed", "temperature-beyond-law",
                     "no-temperature", "temperature-gaps"),
     "wrench": ("zero-wrench", "zero-wrench-beside-tau-ext", "contact-elsewhere",
@@ -281,7 +282,10 @@ def clock_ground(recording: Recording) -> Ground:
     if gaps:
         words = f"{counted(gaps, 'gap')}, the longest {longest:.2g} s at {at:.1f} s"
     more = f", and {len(ranked) - 1} more" if len(ranked) > 1 else ""
-    words += f"; {sentence(ranked[0])}{more}" if ranked else ", nothing repaired"
+    if ranked:
+        words += f"; {sentence(ranked[0])}{more}"
+    elif not recording.source.cuts:
+        words += ", nothing repaired"
     remedy = command("inspect", recording) if odd else None
     return Ground("caution" if odd else "good", "clock", words, remedy)
 
