@@ -24,6 +24,30 @@ def write(path: Path, columns: dict[str, object]) -> Path:
     return path
 
 
+@pytest.mark.parametrize("header", ["Joint {j} {signal} [{unit}]", "{signal}_{j} ({unit})"])
+@pytest.mark.parametrize("columns", [None, "q=position", "q[deg]=position"])
+def test_a_unit_behind_a_name_holds(path, header, columns):
+    """A list that a researcher made by hand has its units in the header."""
+    units = {"position": "deg", "velocity": "deg/s", "current": "mA"}
+    table = {"Time [ms]": 10 * np.arange(ROWS)} | {
+        header.format(j=j, signal=signal, unit=unit): 90.0 + j
+        for signal, unit in units.items()
+        for j in range(1, 7)
+    }
+    log = read(write(path, table), columns=columns)
+    given = 90.0 + np.arange(1, 7)
+    np.testing.assert_allclose(log.t[:2], [0.0, 0.01], rtol=1e-12)
+    np.testing.assert_allclose(log.q[0], np.deg2rad(given), rtol=1e-12)
+    np.testing.assert_allclose(log.dq[0], np.deg2rad(given), rtol=1e-12)
+    np.testing.assert_allclose(log.current[0], 1e-3 * given, rtol=1e-12)
+
+
+def test_one_signal_in_two_units_is_refused(path):
+    table = CLOCK | {f"q{j} [{'deg' if j == 3 else 'rad'}]": 0.1 * j for j in range(1, 7)}
+    with pytest.raises(LogError, match="several units"):
+        read(write(path, table))
+
+
 @pytest.mark.parametrize(
     "pattern", ["{signal}_{joint}", "{joint}_{signal}", "{joint}.{signal}", "{signal}/{joint}"]
 )

@@ -5,7 +5,7 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 
-from vftcli.readers.columns import Cell, Cells, Item, parse_columns
+from vftcli.readers.columns import UNITS, Cell, Cells, Item, parse_columns, unit_factor
 from vftcli.readers.reading import FORMATS, LogFormat
 from vftcli.readers.table import (
     OWN_STAMPS,
@@ -68,6 +68,9 @@ SIGNAL_OF_JOINT = (
     re.compile(rf"(?i)(?P<joint>[A-Za-z][\w ]*?)[_./ ](?P<stem>{SIGNAL_WORDS})"),
 )
 
+#: A unit behind a column's name, as in "q1 [deg]".
+UNIT = re.compile(r"(.*?)[ _]?[\[(]([^\[\]()]+)[\])]")
+
 NUMBERED_JOINT = re.compile(r"(?i)(joint|j)?_?\d+")
 #: What a pose has in place of joints.
 AXES = re.compile(r"(?i)r?[xyz]|q[wxyz]|roll|pitch|yaw")
@@ -95,9 +98,10 @@ class NamedColumns:
         self.twice: dict[str, str] = {}
         self.joints: dict[str, Names] = {}
         found: dict[str, dict[int, Cell]] = {}
-        by_joint = _joint_columns(table)
+        names = [without_unit(name)[0] for name in table.names]
+        by_joint = _joint_columns(table, names)
         in_joints = {cell.column for cells in by_joint.values() for cell in cells.values()}
-        for column, name in enumerate(table.names):
+        for column, name in enumerate(names):
             if column in table.lists:
                 found.setdefault(name.lower(), {}).update(enumerate(cells_of(table, column)))
             elif column not in in_joints and (match := INDEXED.fullmatch(name)):
@@ -106,8 +110,8 @@ class NamedColumns:
                     self.twice[stem] = name
         for stem, of_joint in by_joint.items():
             each = tuple(of_joint)
-            names = self.joints[stem] = tuple(each[k] for k in kinematic_order(each))
-            found[stem] = {k: of_joint[name] for k, name in enumerate(names)}
+            self.joints[stem] = tuple(each[k] for k in kinematic_order(each))
+            found[stem] = {k: of_joint[name] for k, name in enumerate(self.joints[stem])}
             self.twice.pop(stem, None)
         # Not by place: a table may hold q_10 before q_2.
         self.groups = {stem: dict(sorted(cells.items())) for stem, cells in found.items()}
@@ -146,10 +150,21 @@ class NamedColumns:
                     f"{self.table.path}: the columns of {name} are numbered "
                     f"{', '.join(map(str, indices[:12]))}, with holes. Name them with --columns."
                 )
-            if name in TURNED:
-                return Item(signal, -1.0, cells=cells, remark=RESIDUAL_TURNED)
-            return Item(signal, cells=cells)
+            unit, remark = self.unit(cells), None if name not in TURNED else RESIDUAL_TURNED
+            factor = unit_factor(signal, unit) * (-1.0 if remark else 1.0)
+            return Item(signal, factor, unit, cells=cells, remark=remark)
         return None
+
+    def unit(self, cells: Cells) -> str | None:
+        """The unit in the names of some columns, if any."""
+        unit, *others = {without_unit(self.table.names[cell.column])[1] for cell in cells}
+        if others:
+            first = self.table.names[cells[0].column]
+            raise LogError(
+                f"{self.table.path}: columns like {first!r} have several units. Name them with "
+                "--columns."
+            )
+        return unit
 
     def _usual(self, signal: str) -> Item | None:
         if (item := self.usual.get(signal)) is None:
@@ -169,7 +184,10 @@ class NamedColumns:
         """The columns that an item of --columns means."""
         pattern = item.pattern or ""
         if pattern not in self.table.names and pattern.lower() in self.groups:
-            return pick_of(item, self.cells(pattern))
+            cells = self.cells(pattern)
+            unit = item.unit or self.unit(cells)
+            factor = unit_factor(item.signal, unit) * math.copysign(1.0, item.factor)
+            return pick_of(item._replace(unit=unit, factor=factor), cells)
         if pattern or item.rate is not None:
             return pick_of(item, named_cells(self.table, item))
         found = self.find(item.field)
@@ -235,14 +253,21 @@ def picks_by_alias(
     return picks, names
 
 
-def _joint_columns(table: Table) -> dict[str, dict[str, Cell]]:
+def without_unit(name: str) -> tuple[str, str | None]:
+    """A column's name without the unit behind it, and the unit or None."""
+    match = UNIT.fullmatch(name)
+    known = match and any(match[2] in units for units in UNITS.values())
+    return (match[1], match[2]) if match and known else (name, None)
+
+
+def _joint_columns(table: Table, names: Sequence[str]) -> dict[str, dict[str, Cell]]:
     """Columns that bear a signal's name beside a joint's: signal → joint → cell.
 
     PlotJuggler's names are split only where two signals have the same joints, no axes.
     """
     found: dict[str, dict[str, Cell]] = {}
     sure = set[str]()
-    for column, name in enumerate(table.names):
+    for column, name in enumerate(names):
         match = next((m for p in SIGNAL_OF_JOINT if (m := p.fullmatch(name))), None)
         if match is None or column in table.lists:
             continue

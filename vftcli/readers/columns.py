@@ -28,16 +28,18 @@ DEGREE = 0.017453292519943295
 #: Kind of signal → unit in brackets → factor to SI.
 UNITS: dict[str, dict[str, float]] = {
     "t": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9},
-    "q": {"rad": 1.0, "mrad": 1e-3, "deg": DEGREE, "rev": 360 * DEGREE},
+    "q": {"rad": 1.0, "mrad": 1e-3, "deg": DEGREE, "°": DEGREE, "rev": 360 * DEGREE},
     "dq": {
-        "rad/s": 1.0, "rad": 1.0, "deg/s": DEGREE, "deg": DEGREE, "rpm": 6 * DEGREE,
+        "rad/s": 1.0, "rad": 1.0, "deg/s": DEGREE, "deg": DEGREE, "°/s": DEGREE,
+        "rpm": 6 * DEGREE,
     },
     "current": {"A": 1.0, "mA": 1e-3},
-    "tau": {"Nm": 1.0, "N·m": 1.0, "mNm": 1e-3, "Ncm": 1e-2},
+    "tau": {"Nm": 1.0, "N·m": 1.0, "N.m": 1.0, "N*m": 1.0, "mNm": 1e-3, "Ncm": 1e-2},
     "temperature": {"C": 1.0, "°C": 1.0, "degC": 1.0},
 }  # fmt: skip
 #: Torques of every kind have the same units.
-UNITS |= dict.fromkeys(("tau+g", "torque", "tau_ext"), UNITS["tau"])
+TORQUES = ("tau+g", "torque", "torque_without_gravity", "tau_ext")
+UNITS |= dict.fromkeys(TORQUES, UNITS["tau"])
 
 ITEM = re.compile(
     r"(?P<minus>-)?(?P<name>tau\+g|[A-Za-z_]+)(?:\[(?P<unit>[^\]]*)\])?"
@@ -146,7 +148,7 @@ def _parse_item(part: str) -> Item:
         )
     if name == "_" and (pattern or minus):
         raise LogError(f"--columns: {part!r}: _ only skips, as in _:13.")
-    factor, hertz = _unit_factor(name, unit) * (-1.0 if minus else 1.0), None
+    factor, hertz = unit_factor(name, unit) * (-1.0 if minus else 1.0), None
     if rate is not None:
         with suppress(ValueError):
             hertz = float(rate)
@@ -162,7 +164,7 @@ def _parse_item(part: str) -> Item:
     return Item(name, factor, unit, count, pattern, hertz)
 
 
-def _unit_factor(signal: str, unit: str | None) -> float:
+def unit_factor(signal: str, unit: str | None) -> float:
     """Factor from a unit to SI; 1 for a wrench, which has a frame."""
     if unit is None or signal in {"wrench", "_"}:
         return 1.0
