@@ -115,7 +115,7 @@ def test_mcap_and_rosbags_read_every_sample(path: Path, messages: dict[str, list
     """Every message of the file by the format's own reader, in the order of time as written."""
     observers = ("best", "fdo", "gmo", "kfo_fe", "kfo_zoh", "reference")
     topics = ["/joint_states", *(f"/vftcli/external/{name}" for name in observers)]
-    counts = dict.fromkeys([*topics, "/vftcli/wrench/best"], 600) | {"/vftcli/contacts/log": 4}
+    counts = dict.fromkeys([*topics, "/vftcli/wrench/best"], 600)
     assert {topic: len(found) for topic, found in messages.items()} == counts
     with path.open("rb") as file:
         reader = make_reader(file, validate_crcs=True)
@@ -141,17 +141,6 @@ def test_wrenches_in_base_axes_say_about_where(with_wrench: Analysis, tmp_path: 
     found = messages_of(tmp_path / "wrench.mcap")
     wrenches = [each for topic, each in found.items() if topic.startswith("/vftcli/wrench")]
     assert {m.header.frame_id for each in wrenches for _, m in each} == {"base@flange"}
-
-
-def test_contacts_are_logged(messages: dict[str, list]) -> None:
-    logged, start = messages["/vftcli/contacts/log"], messages["/joint_states"][0][0]
-    seconds = [(stamp - start) / 1e9 for stamp, _ in logged]
-    assert seconds == pytest.approx([1.0, 1.5, 2.2, 2.6])
-    texts = [message.message for _, message in logged]
-    assert texts[0].startswith("1.00 s: contact 1 begins, for 0.50 s: 65 ± 7 N")
-    assert texts[1] == "contact 1 ends"
-    first = logged[0][1].timestamp
-    assert first.sec * 10**9 + first.nanosec == logged[0][0]
 
 
 def test_states_are_the_log_and_estimates(messages: dict[str, list], analysis: Analysis) -> None:

@@ -5,10 +5,8 @@ ros2 file stops rosbags' reader.
 """
 
 import json
-from collections import deque
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
-from operator import itemgetter
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -16,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vftcli.analysis import Analysis
-from vftcli.outputs.contacts import beginning, contact_name
 from vftcli.outputs.files import SEAL, OutputFolder, atomic, check_file, put_table, table_file
 from vftcli.outputs.run_record import envelope, seal
 from vftcli.readers.bags.decode import long_name
@@ -33,9 +30,6 @@ if TYPE_CHECKING:
     from vftcli.simulation.experiment import Simulation
 
 JOINT_STATE, WRENCH = "sensor_msgs/JointState", "geometry_msgs/WrenchStamped"
-LOG = "foxglove_msgs/Log"
-
-INFO, WARNING = 2, 3  #: Levels of a log message.
 BLOCK = 8192  #: Samples with messages in memory at once.
 LAST_STAMP = 2**31 - 1  #: ROS 2 counts seconds in 32 bits with a sign.
 
@@ -55,10 +49,6 @@ class OutputTopic(NamedTuple):
         part = {k: v[span] if isinstance(v, np.ndarray) else v for k, v in self.values.items()}
         times = stamps[span]
         return serialised(self.kind, {**stamped(times), **part}, len(times))
-
-
-#: A message of the log of contacts: stamp [ns], values.
-Event = tuple[int, Mapping[str, Value]]
 
 
 def joint_topic(
@@ -91,27 +81,13 @@ def write_mcap(path: Path, analysis: Analysis) -> None:
         frame = "base@flange" if wrench.frame == "base" else wrench.frame
         name = f"/vftcli/wrench/{ros_name(wrench.name)}"
         topics.append(wrench_topic(name, frame, wrench.known))
-    write_topics(path, stamps, topics, events(analysis, int(stamps[0])))
+    write_topics(path, stamps, topics)
 
 
 def wrench_topic(name: str, frame: str, values: Array) -> OutputTopic:
     """A topic of WrenchStamped messages. (T, 6) [N, N·m]"""
     parts = six("wrench", ("force", "torque"), values)
     return OutputTopic(name, WRENCH, {"header.frame_id": frame, **parts})
-
-
-def events(analysis: Analysis, start: int) -> list[Event]:
-    """Messages at begin and end of contacts; log from `start`. [ns]"""
-    made = list[Event]()
-    for contact in analysis.listed:
-        level = WARNING if contact.trust == "weak" else INFO
-        end = f"{contact_name(contact)} ends"
-        for t, words in ((contact.start, beginning(contact)), (contact.stop, end)):
-            stamp = start + round(t * 1e9)
-            values = stamped(np.array([stamp]), "timestamp")
-            values |= {"level": level, "message": words, "name": "vftcli"}
-            made.append((stamp, values))
-    return sorted(made, key=itemgetter(0))
 
 
 def ros_name(name: str) -> str:
@@ -135,37 +111,21 @@ def stamps_of(recording: Recording) -> Nanoseconds:
     return stamps if countable else stamps - stamps[0]
 
 
-def write_topics(
-    path: Path, stamps: Nanoseconds, found: Sequence[OutputTopic], events: Sequence[Event] = ()
-) -> None:
-    """Write a ros2-profile MCAP with zstd chunks, sample by sample.
-
-    Each sample has a stamp [ns], (T,); events are in order of time.
-    """
+def write_topics(path: Path, stamps: Nanoseconds, found: Sequence[OutputTopic]) -> None:
+    """Write a ros2-profile MCAP with zstd chunks, sample by sample, stamps (T,) [ns]."""
     from mcap.writer import CompressionType, Writer
 
     with path.open("wb") as file:
         writer = Writer(file, compression=CompressionType.ZSTD)
         writer.start(profile="ros2", library="vftcli")
-        waiting = deque(events)
-        log = channel(writer, "/vftcli/contacts/log", LOG) if events else 0
         channels = [channel(writer, topic.name, topic.kind) for topic in found]
-
-        def add_events(until: float) -> None:
-            """Write the events up to a time. [ns]"""
-            while waiting and waiting[0][0] <= until:
-                stamp, values = waiting.popleft()
-                writer.add_message(log, stamp, serialised(LOG, values, 1).tobytes(), stamp)
-
         # In blocks: an hour's messages at 1 kHz do not fit in memory.
         for start in range(0, len(stamps), BLOCK):
             span = slice(start, start + BLOCK)
             bodies = [topic.messages(stamps, span) for topic in found]
             for k, stamp in enumerate(stamps[span].tolist()):
-                add_events(stamp)
                 for number, body in zip(channels, bodies, strict=True):
                     writer.add_message(number, stamp, body[k].tobytes(), stamp, start + k)
-        add_events(np.inf)
         writer.finish()
 
 

@@ -181,7 +181,7 @@ def element_of(described: Any) -> tuple[str, int | None]:  # noqa: ANN401 - nest
     return name, int(inner[1]) if node == 3 else -1
 
 
-#: Definitions that ROS 2 lacks: Franka's state, Foxglove's log.
+#: Definitions that ROS 2 lacks: Franka's state.
 DEFINITIONS: dict[str, str] = tables_beside(__file__, "messages.toml")
 
 
