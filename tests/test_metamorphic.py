@@ -278,9 +278,7 @@ def observer_added(ask: Ask, logs: Logs) -> None:
     alone = ask(logs.load, "--observer", "gmo", "--free", logs.free)
     more = ("--observer", "gmo", "--observer", "rts-auto", "--free", logs.free)
     both = ask(logs.load, *more)
-    # p_vs_best compares with the others by its meaning.
-    kept = {key: both[key] for key in alone if key in both}
-    equal(alone, kept, but=("p_vs_best",))
+    equal(alone, {key: both[key] for key in alone if key in both})
 
 
 def observer_added_before_a_sensor(ask: Ask, _: Logs) -> None:
@@ -288,7 +286,7 @@ def observer_added_before_a_sensor(ask: Ask, _: Logs) -> None:
     log = FIXTURES / "ur5_sensor.parquet"
     alone = ask(log, "--observer", "gmo", *SENSOR)
     both = ask(log, "--observer", "fdo", "--observer", "gmo", *SENSOR)
-    equal(alone, {key: both[key] for key in alone if key in both}, but=("p_vs_best",))
+    equal(alone, {key: both[key] for key in alone if key in both})
 
 
 def split(ask: Ask, logs: Logs) -> None:

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import polars as pl
 
-from vftcli.evaluation.intervals import Resampled, block_lengths, interval, p_value, resample
+from vftcli.evaluation.intervals import Resampled, block_lengths, interval, resample
 from vftcli.evaluation.scores import skill
 from vftcli.signals.arrays import (
     Z_95,
@@ -48,7 +48,6 @@ SCHEMA: Schema = {
     "reference_rms_Nm": pl.Float64,
     "correlation": pl.Float64,
     "lag_s": pl.Float64,
-    "p_vs_best": pl.Float64,
     "reference": pl.String,
     "reference_floor_Nm": pl.Float64,
     "reference_trusted": pl.Boolean,
@@ -96,9 +95,7 @@ class Scored(NamedTuple):
     reference: Array  #: (T,) [N·m]
     moving: Mask  #: Whether the joint moves: then the reference is reliable. (T,)
     floor: float  #: The reference's own error, NaN if unknown. [N·m]
-    #: Bootstrap draws of the mean squared errors, one column an observer, in shared blocks.
-    paired: Resampled
-    #: Draws of each observer, in blocks of its own length.
+    #: Bootstrap draws of each observer's mean squared error.
     own: tuple[Resampled, ...]
     lag: Array  #: Best-fitting delay of each observer, NaN where nothing fits. (m,) [s]
     within: Array  #: Samples with an error within each observer's 95 % band. (m,)
@@ -153,10 +150,7 @@ def scored(estimates: Sequence[ExternalTorque], reference: ExternalTorque) -> It
         squares = x - y[:, None]
         squares *= squares
         lengths = block_lengths(squares).tolist() if len(squares) else []
-        paired = Resampled(np.ones((1, len(names))), 0)
         own = tuple(resample(x[:, None], n) for x, n in zip(squares.T, lengths, strict=False))
-        if lengths:
-            paired = resample(squares, max(lengths))
         floor = float("nan") if reference.floor is None else float(reference.floor[j])
         if reference.floor is not None and reference.sd is not None and known.any():
             floor = float(np.sqrt(np.nanmean(reference.sd[known, j] ** 2)))
@@ -168,8 +162,7 @@ def scored(estimates: Sequence[ExternalTorque], reference: ExternalTorque) -> It
             reference=y,
             moving=moving[known, j],
             floor=floor,
-            paired=paired,
-            own=own or (paired,) * len(names),
+            own=own or (Resampled(np.ones((1, 1)), 0),) * len(names),
             lag=lag[:, j],
             within=covered[:, 0, j],
             banded=covered[:, 1, j],
@@ -207,7 +200,6 @@ def tidy(rows: Sequence[Mapping[str, object]], schema: Schema) -> pl.DataFrame:
 def rows(recording: str, reference: str, joint: Scored) -> list[dict[str, object]]:
     """One row an observer on one joint."""
     error, lines = joint.error, list[dict[str, object]]()
-    best = int(np.mean(error**2, axis=0).argmin()) if len(error) else 0
     share = joint.moving.mean() if len(error) else 0.0
     for k, name in enumerate(joint.names):
         here: dict[str, object] = {
@@ -219,7 +211,7 @@ def rows(recording: str, reference: str, joint: Scored) -> list[dict[str, object
             "samples": len(joint.reference),
         }
         if len(error):
-            x, draws, paired = np.ascontiguousarray(error[:, k]), joint.own[k], joint.paired.draws
+            x, draws = np.ascontiguousarray(error[:, k]), joint.own[k]
             square, moving = float(np.mean(x**2)), x[joint.moving]
             rmse, level = np.sqrt(square), root_mean_square(joint.reference)
             low, high = interval(square, draws.draws[:, 0], draws.blocks)
@@ -234,7 +226,6 @@ def rows(recording: str, reference: str, joint: Scored) -> list[dict[str, object
                 "reference_rms_Nm": level,
                 "correlation": correlation(joint.estimates[:, k], joint.reference),
                 "lag_s": joint.lag[k],
-                "p_vs_best": 1.0 if k == best else p_value(paired[:, k], paired[:, best]),
                 "reference_trusted": share >= TRUSTED_SHARE,
                 "at_rest": 1.0 - share,
                 "missing": joint.missing[k] / len(x),
@@ -292,7 +283,6 @@ def together(parts: Sequence[Scored]) -> Scored:
         **joined,
         **counts,
         floor=float(np.sqrt(np.sum(share * np.array([p.floor for p in parts]) ** 2))),
-        paired=weighed([p.paired for p in parts], share),
         own=tuple(weighed(each, share) for each in zip(*(p.own for p in parts), strict=True)),
         lag=mean_lag,
     )

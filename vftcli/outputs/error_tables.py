@@ -180,25 +180,23 @@ DETAILS = (
     "95 % interval of the RMSE, moving-block bootstrap [N·m]",
     "delay of the estimate behind the reference, best fit [ms]",
     "samples within the estimate's 95 % band, while the joint moves",
-    "p that it is no worse than the best, paired bootstrap",
 )
 
 
 def details(row: Record) -> tuple[str, ...]:
     """Texts in the tables of `DETAILS` for one row."""
-    low, high, lag, p = (row[k] for k in ("rmse_low_Nm", "rmse_high_Nm", "lag_s", "p_vs_best"))
+    low, high, lag = (row[k] for k in ("rmse_low_Nm", "rmse_high_Nm", "lag_s"))
     share, unknown = row.get("coverage_95"), low is None or high is None
     return (
         DASH if unknown else f"{significant(low, 2)}–{significant(high, 2)}",
         DASH if lag is None else minus(f"{round(1e3 * lag)}"),
         DASH if share is None else f"{100 * share:.0f} %",
-        DASH if p is None else "best" if p >= 1.0 else f"{p:.3f}",
     )
 
 
 def detail_grids(errors: pl.DataFrame) -> Iterator[Grid]:
     """Further tables in the RMSE table's shape, if not empty."""
-    for group in logs_of(errors.filter(pl.col("p_vs_best").is_not_null()), "joint"):
+    for group in logs_of(errors.filter(pl.col("samples") > 0), "joint"):
         columns = "observer", *joint_columns(group["joint"].unique().sort().to_list())
         found = {
             name: list(zip(*map(details, own.iter_rows(named=True)), strict=True))

@@ -153,9 +153,9 @@ def template_of(kind: str, values: Mapping[str, Value], path: str = "") -> Any: 
     return type_store().types[long_name(kind)](**made)
 
 
-def stamped(times: NDArray[np.int64], path: str = "header.stamp") -> dict[str, Value]:
-    """The values of a stamp, of times since 1970. (T,) [ns]"""
-    return {f"{path}.sec": times // 10**9, f"{path}.nanosec": times % 10**9}
+def stamped(times: NDArray[np.int64]) -> dict[str, Value]:
+    """The values of a header's stamp, of times since 1970. (T,) [ns]"""
+    return {"header.stamp.sec": times // 10**9, "header.stamp.nanosec": times % 10**9}
 
 
 def in_parts(path: str, names: str, columns: NDArray[Any]) -> dict[str, Value]:
