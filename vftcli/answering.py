@@ -35,7 +35,6 @@ if TYPE_CHECKING:
     from vftcli.contacts.thresholds import ComparedSignals, Thresholds
     from vftcli.doctor.examination import Examination
     from vftcli.identification.fitting import Identification
-    from vftcli.observers.spectra import Spectra
     from vftcli.observers.tuning import Goal, Tuned
 
 Opened = Path | Recording  #: A log of a call: a file, or already read.
@@ -147,7 +146,6 @@ class FoundGains(NamedTuple):
     run: Run  #: The log and its arm.
     goal: "Goal"
     tuned: "Sequence[Tuned]"  #: The gains of every observer.
-    spectra: "Spectra"  #: Spectra that show every gain's error.
     remarks: tuple[Remark, ...]
     examinations: "tuple[Examination, ...]"  #: Findings on the log and its free runs.
 
@@ -166,7 +164,7 @@ def gains_of(log: Opened, choice: AnalysisChoice, asked: GoalChoice) -> FoundGai
         raise ParameterError(f"gains cannot be found: {why}")
     tuned = tune_all(spectra, goal)
     remarks = (*found.remarks, *bounds_reached(tuned, spectra, goal))
-    return FoundGains(run, goal, tuned, spectra, remarks, examinations)
+    return FoundGains(run, goal, tuned, remarks, examinations)
 
 
 #: Default observer of the force: the paper's controller's.

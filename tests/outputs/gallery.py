@@ -33,7 +33,7 @@ class Picture(NamedTuple):
     height: int = 0  # how much of a page is shown [px]
 
 
-DRAWN = ("torque", "force", "errors", "spectra")
+DRAWN = ("torque", "force", "errors")
 COMMANDS = (
     "vftcli report fixtures/ur5_circle.csv --robot ur5 --reference two-cycle --figures png"
     " -o circle",

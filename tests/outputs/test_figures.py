@@ -8,11 +8,9 @@ from drawings import drawn, names_in
 from vftcli.analysis import Analysis
 from vftcli.contacts.contact_list import ForceCourse
 from vftcli.evaluation.errors import POOLED
-from vftcli.observers.spectra import Spectra
-from vftcli.observers.tuning import Tuned, parse_goal, tune_all, tuning_curves
 from vftcli.outputs import figures
-from vftcli.outputs.paper import WIDTHS, figure_files
-from vftcli.signals.errors import OutputError, ParameterError
+from vftcli.outputs.paper import WIDTHS
+from vftcli.signals.errors import ParameterError
 
 pytest.importorskip("matplotlib", reason="no figure is drawn without matplotlib")
 
@@ -84,54 +82,6 @@ def test_of_many_logs_only_what_stands_for_all_is_drawn(pushed: Analysis) -> Non
     drawing = figures.error_figures(pl.concat([*many, pooled]))["errors"]
     assert len(drawn(drawing).axes) == 1
     assert figures.error_figures(rows.clear()) == {}
-
-
-@pytest.fixture(scope="module")
-def spectra() -> Spectra:
-    """Torque that falls with f⁻⁴ from 1 Hz over white noise, on two joints of different size."""
-    f = np.linspace(0.0, 62.5, 251)
-    torque = np.outer(1.0 / (1.0 + f**4), [10.0, 1.0])
-    noise = np.full((251, 2), 1e-3)
-    return Spectra(frequency=f, free=noise, loaded=noise + torque, step=0.008, segments=(9, 9))
-
-
-@pytest.fixture(scope="module")
-def tuned(spectra: Spectra) -> tuple[Tuned, ...]:
-    return tune_all(spectra, parse_goal("auto"))
-
-
-def test_spectra_bear_responses_and_choices(spectra: Spectra, tuned: tuple[Tuned, ...]) -> None:
-    found = figures.tuned_figures(spectra, tuned)
-    assert list(found) == list(figures.TUNED_FIGURES)
-    first, second = (drawn(drawing, "single") for drawing in found.values())
-    assert names_in(first)[2:] == [f"|H| of {line.observer}" for line in tuned]
-    assert first._supylabel.get_text() == "Power density (dB of 1 (N·m)²/Hz)"
-    gmo = second.axes[1].lines[3 + 1]
-    assert gmo.get_xdata()[0] == pytest.approx(tuned[1].rate[1] / (2.0 * np.pi))
-    assert gmo.get_ydata()[0] == pytest.approx(tuned[1].rmse[1])
-
-
-def test_the_least_of_a_curve_is_chosen(spectra: Spectra, tuned: tuple[Tuned, ...]) -> None:
-    curves = tuning_curves(spectra)
-    for line, name in ((tuned[1], "fdo, gmo"), (tuned[2], "kfo-zoh"), (tuned[3], "kfo-rts")):
-        np.testing.assert_array_equal(curves[name].best, line.rate)
-        # Both sum the same spectra, in another order.
-        np.testing.assert_allclose(curves[name].least, line.rmse, rtol=1e-12)
-
-
-@pytest.mark.slow
-def test_gains_and_figures_appear_together(spectra, tuned, tmp_path):
-    path = tmp_path / "gains.toml"
-    figures.write_tuned(path, ["why"], spectra, tuned)
-    alone = path.read_text(encoding="utf-8")
-    assert alone.startswith("# why\n")
-    with pytest.raises(OutputError, match="exists"):
-        figures.write_tuned(path, ["why"], spectra, tuned, form="svg")
-    assert [p.name for p in tmp_path.iterdir()] == ["gains.toml"]
-    figures.write_tuned(path, ["why"], spectra, tuned, force=True, form="svg")
-    assert path.read_text(encoding="utf-8") == alone
-    wanted = {"gains.toml", *figure_files("svg", figures.TUNED_FIGURES, "gains-")}
-    assert {p.name for p in tmp_path.iterdir()} == wanted
 
 
 def test_a_plot_for_a_notebook_is_of_what_is_asked_for(analysis: Analysis) -> None:

@@ -86,9 +86,10 @@ def identify_robot(
 
     task, free = asked.of(Task), asked.of(FreeChoice)
     gains = asked.words["gains"]
-    check_uses(task, free, logs, {"--check": check, "--open": show, "--gains": gains})
+    others = {"--check": check, "--open": show, "--figures": figures, "--gains": gains}
+    check_uses(task, free, logs, others)
     if task.method == "gains":
-        find_gains(logs[0], output, asked, figures)
+        find_gains(logs[0], output, asked)
         return
     library = Library([*logs, *(check or ()), *free.logs])
     examiner = health_of(library, anyway=asked.anyway, fitting=task.keeps_links)
@@ -114,15 +115,15 @@ def identify_robot(
         open_made(output.with_suffix(".html"))
 
 
-def find_gains(log: Path, output: Path | None, asked: Asked, figures: str | None) -> None:
+def find_gains(log: Path, output: Path | None, asked: Asked) -> None:
     """Write the gains for a goal, by the log's spectra."""
     from vftcli.answering import TUNED, gains_of
     from vftcli.outputs.examination import health_record, overridden_lines
-    from vftcli.outputs.figures import write_tuned
-    from vftcli.outputs.files import check_file
+    from vftcli.outputs.files import check_file, write_text
     from vftcli.outputs.grid import terminal
     from vftcli.outputs.grids import tuned_grid
     from vftcli.readers.reading import Library
+    from vftcli.robots.robot_file import lines_of
 
     choice, goal = opt.choice_for(asked, Library([log]), observers=TUNED), asked.of(GoalChoice)
     force = asked.words["force"]
@@ -134,9 +135,11 @@ def find_gains(log: Path, output: Path | None, asked: Asked, figures: str | None
     notes, health = list(map(str, found.remarks)), found.examinations
     said = asked.line, f"goal: {goal.gains}", f"robot: {found.run.robot.name}"
     heading = [*overridden_lines(health), *said, *notes]
-    write_tuned(output, heading, found.spectra, found.tuned, force=force, form=figures)
+    gains = {"observers": {line.section: dict(line.gains) for line in found.tuned}}
+    text = "".join([*(f"# {line}\n" for line in heading), *lines_of(gains)])
+    write_text(output, text, force)
     if asked.words["json"]:
-        rows = [line.record for line in found.tuned]
+        rows = [line._asdict() for line in found.tuned]
         about = {"goal": goal.gains, "examination": health_record(health), "observers": rows}
         say_json([found.run.recording], found.remarks, **about)
         return

@@ -268,12 +268,6 @@ class Tuned(NamedTuple):
     rmse: Array  #: Expected error. (n,) [N·m]
     #: Expected false alarms an hour, None without a threshold. (n,)
     alarms: Array | None = None
-    running: Observer | None = None  #: The observer with these gains.
-
-    @property
-    def record(self) -> dict[str, Any]:
-        """Everything but the observer itself, for machines."""
-        return {key: value for key, value in self._asdict().items() if key != "running"}
 
 
 def tune_all(spectra: Spectra, goal: Goal) -> tuple[Tuned, ...]:
@@ -306,14 +300,8 @@ def tune_all(spectra: Spectra, goal: Goal) -> tuple[Tuned, ...]:
         power = abs(response) ** 2 * spectra.noise * spectra.width
         alarms = None if threshold is None else crossings(power, spectra.frequency, threshold)
         section, delay = "kfo" if name == "kfo-zoh" else name, observer.tuning(step, n).delay
-        tuned.append(Tuned(name, section, gains, rate, delay, rmse, alarms, observer))
+        tuned.append(Tuned(name, section, gains, rate, delay, rmse, alarms))
     return tuple(tuned)
-
-
-def tuning_curves(spectra: Spectra) -> dict[str, Curve]:
-    """Observer → expected error over rate."""
-    kinds = {"fdo, gmo": momentum, **KALMAN}
-    return {name: error_curve(kind, spectra) for name, kind in kinds.items()}
 
 
 def bounds_reached(tuned: Sequence[Tuned], spectra: Spectra, goal: Goal) -> tuple[Remark, ...]:

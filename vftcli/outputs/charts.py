@@ -86,8 +86,6 @@ class Chart(NamedTuple):
     band: Array | None = None
     band_label: str = ""
     spans: Sequence[tuple[float, float]] = ()  #: Stretches that are marked, as contacts. [s]
-    unit: str = "s"  #: Unit of the horizontal axis.
-    log: bool = False  #: Whether the horizontal axis is logarithmic.
     #: Least lower end of the vertical axis, with 0; None: by lines.
     lowest: float | None = None
     highest: float | None = None  #: Upper end; None: by the lines.
@@ -152,7 +150,7 @@ def drawn_line(
     Each is NaN where the other applies; none without a ribbon.
     """
     x = chart.x if line.x is None else line.x
-    t, y = thinned(x, line.values[:, panel], stretches, log=chart.log)
+    t, y = thinned(x, line.values[:, panel], stretches)
     if line.half is None:
         return t, y, []
     half = line.half[:, panel]
@@ -161,21 +159,17 @@ def drawn_line(
     return t, y, [np.interp(t, x, each) for each in halves]
 
 
-def thinned(t: Array, values: Array, stretches: int, *, log: bool = False) -> tuple[Array, Array]:
+def thinned(t: Array, values: Array, stretches: int) -> tuple[Array, Array]:
     """A series with at most two samples a stretch, and its ends.
 
     The lowest and highest sample of every stretch keep their time and value. A log of at most
     twice as many samples stays whole. NaN breaks the line at unknown values and at gaps of
-    the clock, which a logarithmic axis lacks.
+    the clock.
     """
-    gaps = np.empty(0, dtype=np.intp) if log else gaps_of(t, GAP_STEPS)
-    x, y = t, values
+    gaps, x, y = gaps_of(t, GAP_STEPS), t, values
     if len(t) > 2 * stretches:
-        starts = even_starts(len(t), stretches)
-        if log:
-            starts = np.unique(np.searchsorted(t, np.geomspace(t[0], t[-1], stretches)))
         # Samples beside a gap stay, so that lines end there.
-        ends = extremes([values], starts)
+        ends = extremes([values], even_starts(len(t), stretches))
         kept = np.unique(np.concatenate([[0, len(t) - 1], ends, gaps, gaps + 1]))
         x, y = t[kept], values[kept]
     after = np.searchsorted(x, t[gaps], side="right")

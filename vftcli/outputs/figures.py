@@ -1,8 +1,7 @@
-"""Figures of one log (force, torque, wrench, errors, spectra) and of gains."""
+"""Figures of one log: force, torque, wrench, errors."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from functools import partial
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,16 +10,11 @@ import polars as pl
 from vftcli.analysis import Analysis
 from vftcli.contacts.contact_list import Contact, ContactList
 from vftcli.evaluation.errors import POOLED
-from vftcli.observers.observer import Observer
-from vftcli.observers.spectra import Spectra
 from vftcli.observers.table import BEST
-from vftcli.observers.tuning import Curve, Tuned, tuning_curves
-from vftcli.outputs.charts import INK, Chart, ChartLine, colours_of_names, lines_of_names
+from vftcli.outputs.charts import Chart, ChartLine, colours_of_names
 from vftcli.outputs.error_tables import block, logs_of
-from vftcli.outputs.files import OutputFolder, write_text
 from vftcli.outputs.page.log_charts import (
     contact_spans,
-    joint_panels,
     reference_name,
     torque_chart,
     wrench_chart,
@@ -31,13 +25,10 @@ from vftcli.outputs.paper import (
     DotPlot,
     Drawing,
     dot_figure,
-    figure_files,
     line_figure,
     paper_style,
     plots_of,
-    write_figures,
 )
-from vftcli.robots.robot_file import lines_of
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.packages import check_installed
 from vftcli.signals.parsing import check_known
@@ -48,16 +39,9 @@ if TYPE_CHECKING:
     from vftcli.signals.arrays import Array
 
 #: Every figure that a log may have.
-LOG_FIGURES = ("force", "torque", "errors", "wrench", "spectra", "tuning")
-TUNED_FIGURES = ("spectra", "tuning")  #: Those beside gains that were found.
+LOG_FIGURES = ("force", "torque", "errors", "wrench")
 ERROR_FIGURES = ("errors",)  #: The figure of a table of errors.
 MOST = 8  #: Most logs in one figure of errors; more show only their summary.
-#: Gain drawn for none, -240 dB; lowest gain shown. [–], [dB]
-QUIETEST, LOWEST = 1e-12, -80.0
-#: Colours of the two spectra.
-FREE, LOADED = "#3b7ea1", "#c2410c"
-#: Dashes of responses, drawn in black beside coloured spectra.
-BROKEN = ("1.5 2", "8 2 1.5 2", "4 2", "8 2 1.5 2 1.5 2", "12 4", "")
 
 
 def log_figures(analysis: Analysis) -> dict[str, Drawing]:
@@ -82,14 +66,6 @@ def log_figures(analysis: Analysis) -> dict[str, Drawing]:
                 numbers=numbers,
             ),
         )
-    if (refined := analysis.refinement) is not None:
-        if (spectra := refined.baselines.plain.spectra) is not None:
-            # One observer's |H|: all would hide one another.
-            lead = next((o for o in analysis.observers if o.name == BEST), analysis.observers[0])
-            found["spectra"] = spectra_drawing(spectra, {lead.name: lead})
-        if refined.curves:
-            best = {key: (curve.best, curve.least) for key, curve in refined.curves.items()}
-            found["tuning"] = tuning_drawing(refined.curves, best)
     return found
 
 
@@ -192,89 +168,3 @@ def error_figures(errors: pl.DataFrame) -> dict[str, Drawing]:
         names |= dict.fromkeys(found.observers)
     draw = partial(dot_figure, plots=plots, paints=colours_of_names([*names]), label="RMSE (N·m)")
     return {"errors": Drawing("RMSE of the external torque with its 95 % interval", draw)}
-
-
-def over_frequency(
-    key: str, title: str, unit: str, x: "Array", lines: Sequence[ChartLine]
-) -> Chart:
-    """A chart over frequency, a panel a joint. (T,) [Hz]"""
-    panels = joint_panels(lines[0].values.shape[1])
-    return Chart(key, title, (unit,) * len(panels), panels, x, tuple(lines), unit="Hz", log=True)
-
-
-def spectra_drawing(spectra: Spectra, observers: Mapping[str, Observer]) -> Drawing:
-    """Spectra of free and loaded part, with |H| of these observers."""
-    frequency = spectra.frequency[1:]
-    # In decibels; the least number above 0 replaces zero.
-    parts = [
-        ChartLine(name, 10.0 * np.log10(np.maximum(power[1:], np.finfo(float).tiny)), *style)
-        for name, power, style in (
-            ("free part, S_n", spectra.free, (FREE, "")),
-            ("loaded part, S_d", spectra.loaded, (LOADED, "5 2")),
-        )
-    ]
-    title = "Spectrum of the disturbance, dB of 1 (N·m)²/Hz"
-    chart, lines = over_frequency("spectra", title, "dB", frequency, parts), []
-    for k, (name, observer) in enumerate(observers.items()):
-        response = observer.frequency_response(frequency, spectra.step, spectra.joints)
-        gain = 20.0 * np.log10(np.maximum(np.abs(response), QUIETEST))
-        gain = np.broadcast_to(gain, (len(frequency), spectra.joints))
-        lines.append(ChartLine(f"|H| of {name}", gain, INK, BROKEN[k % len(BROKEN)]))
-    over = chart._replace(key="gain", title="|H|", series=tuple(lines), lowest=LOWEST)
-
-    def draw(width: float) -> "Figure":
-        figure = line_figure(width, plots_of(chart, over))
-        figure.supylabel("Power density (dB of 1 (N·m)²/Hz)", fontsize=8.0)
-        return figure
-
-    return Drawing(f"{chart.title}, and |H|", draw)
-
-
-def tuning_drawing(
-    curves: "Mapping[str, Curve]", chosen: "Mapping[str, tuple[Array, Array]]"
-) -> Drawing:
-    """Expected error over frequency, chosen rates [rad/s]."""
-    styles = lines_of_names(list(curves))
-    lines = [
-        ChartLine(name, curve.rmse, *styles[name], x=curve.omega_n / (2.0 * np.pi))
-        for name, curve in curves.items()
-    ]
-    x = np.concatenate([line.x for line in lines if line.x is not None])
-    title, ends = "Expected error against natural frequency ω_n/2π", np.array([x.min(), x.max()])
-    chart = over_frequency("curve", title, "N·m", ends, lines)
-    marks = {name: (rate / (2.0 * np.pi), least) for name, (rate, least) in chosen.items()}
-    plots, below = plots_of(chart), "Natural frequency (Hz)"
-    return Drawing(chart.title, partial(line_figure, plots=plots, marks=marks, below=below))
-
-
-def tuned_figures(spectra: Spectra, tuned: Sequence[Tuned]) -> dict[str, Drawing]:
-    """Spectra with |H| of every observer, and expected errors."""
-    running = {line.observer: line.running for line in tuned if line.running is not None}
-    chosen = {line.observer: (line.rate, line.rmse) for line in tuned}
-    return {
-        "spectra": spectra_drawing(spectra, running),
-        "tuning": tuning_drawing(tuning_curves(spectra), chosen),
-    }
-
-
-def write_tuned(
-    path: Path,
-    heading: Sequence[str],
-    spectra: Spectra,
-    tuned: Sequence[Tuned],
-    *,
-    force: bool = False,
-    form: str | None = None,
-) -> None:
-    """Write gains, and their figures beside them, all or nothing."""
-    comments = "".join(f"# {line}\n" for line in heading)
-    gains = {"observers": {line.section: dict(line.gains) for line in tuned}}
-    text = comments + "".join(lines_of(gains))
-    if form is None:
-        write_text(path, text, force)
-        return
-    before = f"{path.stem}-"
-    names = [path.name, *figure_files(form, TUNED_FIGURES, before)]
-    with OutputFolder(path.parent, force, names) as folder:
-        folder.write(path.name, text)
-        write_figures(folder, tuned_figures(spectra, tuned), form, before)

@@ -67,8 +67,6 @@ DIGIT, BETWEEN = 0.046, 0.02
 SPREAD = 0.66  #: Share of a joint's room that its dots take.
 RANGE = 10.0  #: A larger ratio of numbers has a logarithmic axis.
 PLOTTED = 0.75  #: Rough share of a plot's room for its axes.
-#: Unit of a horizontal axis → what it is called.
-AXES = {"s": "Time (s)", "Hz": "Frequency (Hz)"}
 
 Look = dict[str, Any]  #: Arguments of matplotlib.
 BAND_LOOK: Look = {
@@ -78,11 +76,6 @@ BAND_LOOK: Look = {
 ABOVE: Look = {
     "xycoords": ("data", "axes fraction"), "xytext": (0, 1), "textcoords": "offset points",
     "ha": "center", "va": "bottom", "fontsize": 6.5,
-}  # fmt: skip
-#: Place of an axis label without a plot.
-BELOW: Look = {
-    "xycoords": "axes fraction", "xytext": (0, -12), "textcoords": "offset points",
-    "ha": "center", "va": "top",
 }  # fmt: skip
 WHISKER_LOOK: Look = {"elinewidth": 0.6, "capsize": 1.4, "capthick": 0.6}
 CONTACT_LOOK: Look = {"facecolor": "0.9", "linewidth": 0.0, "zorder": 0.9}
@@ -165,15 +158,11 @@ class Plot(NamedTuple):
 
     chart: Chart
     panel: int  #: Number of the panel, from 0.
-    #: A chart over it with an axis of its own, or None.
-    over: Chart | None = None
 
 
-def plots_of(
-    chart: Chart, over: Chart | None = None, only: Sequence[int] | None = None
-) -> list[Plot]:
+def plots_of(chart: Chart, only: Sequence[int] | None = None) -> list[Plot]:
     """Every panel of a chart, or only some, as plots."""
-    return [Plot(chart, j, over) for j in (range(len(chart.panels)) if only is None else only)]
+    return [Plot(chart, j) for j in (range(len(chart.panels)) if only is None else only)]
 
 
 def line_figure(
@@ -181,15 +170,12 @@ def line_figure(
     plots: Sequence[Plot],
     *,
     numbers: Mapping[int, float] = {},
-    marks: Mapping[str, tuple[Array, Array]] = {},
     columns: int | None = None,
-    below: str | None = None,
 ) -> "Figure":
-    """Plots row by row under one legend, in this width. [in]
+    """Plots over time, row by row under one legend, in this width. [in]
 
-    Above the first row are numbers at their times [s]; a name has a mark in each plot, x and
-    y, 2 × (n,). A row has `columns` plots, None for what fits; `below` is the name of the
-    horizontal axis, None for its unit's.
+    Above the first row are numbers at their times [s]. A row has `columns` plots, None for
+    what fits.
     """
     wide = width > NARROW
     columns = min(len(plots), columns or (2 if not wide else 4 if len(plots) > 6 else 3))
@@ -197,13 +183,10 @@ def line_figure(
     if numbers:
         figure.set_figheight(figure.get_figheight() + 0.12)
     for k, (axes, plot) in enumerate(zip(grid, plots, strict=False)):
-        draw_plot(axes, plot, ends_row=(k + 1) % columns == 0)
+        draw_plot(axes, plot)
         axes.set_ylabel(f"{plot.chart.panels[plot.panel]} ({plot.chart.units[plot.panel]})")
-        last = k + columns >= len(grid)
-        if last or (
-            k + columns < len(plots) and plots[k + columns].chart.unit != plot.chart.unit
-        ):
-            axes.set_xlabel(below or AXES[plot.chart.unit])
+        if k + columns >= len(plots):
+            axes.set_xlabel("Time (s)")
         else:
             axes.tick_params(labelbottom=False)
         (start, stop), end = axes.get_xlim(), -np.inf
@@ -214,18 +197,8 @@ def line_figure(
             if at - half >= end:
                 axes.annotate(str(number), (at, 1.0), **ABOVE)
                 end = at + half + BETWEEN * inch
-        for n, (name, (x, y)) in enumerate(marks.items()):
-            axes.plot(x[plot.panel], y[plot.panel], label=f"{name}, chosen", **dot_look(n))
-    # An empty place has the numbers and label of the axis above it.
-    for axes, plot in zip(grid[len(plots) :], plots[len(plots) - columns :], strict=False):
-        set_scale(axes, plot.chart)
-        axes.patch.set_visible(False)
-        axes.spines[:].set_visible(False)
-        axes.yaxis.set_visible(False)
-        # Numbers inside the empty place need no room.
-        axes.tick_params(which="both", bottom=False, labelbottom=False)
-        axes.tick_params(labeltop=True, pad=-10.0)
-        axes.annotate(below or AXES[plot.chart.unit], (0.5, 1.0), **BELOW)
+    for axes in grid[len(plots) :]:
+        axes.set_axis_off()
     figure.align_ylabels(list(grid[: len(plots)]))
     each = (zip(*axes.get_legend_handles_labels(), strict=True) for axes in figure.axes)
     named = {name: artist for artists in each for artist, name in artists}
@@ -234,8 +207,8 @@ def line_figure(
     return figure
 
 
-def draw_plot(axes: "Axes", plot: Plot, *, ends_row: bool = True) -> None:
-    """One panel with contacts, bands, lines, the chart over it."""
+def draw_plot(axes: "Axes", plot: Plot) -> None:
+    """One panel with contacts, bands and lines."""
     from matplotlib.ticker import MaxNLocator
 
     chart, j = plot.chart, plot.panel
@@ -254,27 +227,9 @@ def draw_plot(axes: "Axes", plot: Plot, *, ends_row: bool = True) -> None:
             axes.axhline(sign * chart.band[j], label=chart.band_label, **BAND_LOOK)
     for start, stop in chart.spans:
         axes.axvspan(start, stop, label="contact", **CONTACT_LOOK)
-    set_scale(axes, chart)
+    axes.set_xlim(float(chart.x[0]), float(chart.x[-1]))
     axes.set_ylim(*chart.ends(j))
     axes.yaxis.set_major_locator(MaxNLocator(4))
-    if (over := plot.over) is not None:
-        right = axes.twinx()
-        draw_plot(right, Plot(over, j))
-        if ends_row:
-            right.set_ylabel(f"{over.title} ({over.units[j]})")
-        else:
-            right.tick_params(labelright=False)
-
-
-def set_scale(axes: "Axes", chart: Chart) -> None:
-    """The horizontal axis of a chart."""
-    from matplotlib.ticker import FormatStrFormatter, NullFormatter
-
-    if chart.log:
-        axes.set_xscale("log")
-        axes.xaxis.set_major_formatter(FormatStrFormatter("%g"))
-        axes.xaxis.set_minor_formatter(NullFormatter())
-    axes.set_xlim(float(chart.x[0]), float(chart.x[-1]))
 
 
 def dot_look(k: int, paint: str = "black", edge: float = 0.7, fill: str = "white") -> Look:
