@@ -393,8 +393,6 @@ WITHOUT_ROW = {
         "free-part-not-quiet", "gains-without-free-part"),
     "keeps the profile's links where the user wants them": ("links-identified",),
     "asks for a description of the user's own arm": ("no-robot-fits", "no-robot-fits-any"),
-    "the controller's payload stays wrong in the log; the estimate is mended": (
-        "payload-mismatch",),
     "about Table I; tried in tests/evaluation/test_published.py": (
         "print-kalman-density", "print-noise-floor"),
     "tried in tests/robots/test_urdf.py": ("simulator-friction-left",),

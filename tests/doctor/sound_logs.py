@@ -63,7 +63,7 @@ LOGS: tuple[SoundLog, ...] = (
         for name in ("identification", "repeat_a", "repeat_b")
         for robot in ("ur3", "")
     ),
-    SoundLog("rtde/static_cb3.csv", None, "", ("payload-mismatch", "no-robot-fits")),
+    SoundLog("rtde/static_cb3.csv", None, "", ("no-robot-fits",)),
     # It declares a payload that the robot file does not mount.
     *(
         SoundLog(
@@ -153,7 +153,5 @@ def parts(recording: Recording) -> Iterator[tuple[str, Recording]]:
 def unexpected(log, recording, findings) -> tuple[Remark, ...]:
     """The warnings that nothing known of a log explains."""
     slow = ("slow-rate",) if recording.median_step > 1 / 50 else ()  # thinned below the limit
-    # In a part that rests long enough a load shows in the controller's own currents too.
-    load = ("payload-mismatch",) if "unmodelled-load" in log.known else ()
-    known = (*log.known, *slow, *load)
+    known = (*log.known, *slow)
     return tuple(f for f in findings if f.level == "warning" and not f.code.startswith(known))

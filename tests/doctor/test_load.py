@@ -1,4 +1,4 @@
-"""Payload and drive constants, from what the controller expects, with known faults."""
+"""Loads and joint temperatures, with known faults."""
 
 from dataclasses import replace
 
@@ -7,153 +7,11 @@ import pytest
 from swinging import Said, only
 
 from vftcli.doctor import examine, in_words
-from vftcli.doctor.load import controller_findings, temperature_findings
+from vftcli.doctor.load import temperature_findings
 from vftcli.robots import Robot, load_robot
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark
 from vftcli.simulation import load_scenario, simulate
-
-T = 0.01 * np.arange(400)
-UR10E = load_robot("ur10e")
-PROFILE = np.asarray(UR10E.torque_constant)
-
-
-def log(*extra: float) -> Recording:
-    """An arm at rest whose joints carry more current than is expected, by so much. [A]"""
-    rest = np.zeros((400, 6))
-    return Recording(t=T, q=rest, dq=rest, current=rest + np.array(extra), target_current=rest)
-
-
-def with_constants(still: Recording, constant: float) -> Recording:
-    """A controller that has these drive constants, by an expected ampere on every joint. [N·m/A]"""
-    one = np.ones((400, 6))
-    targets = {"target_current": one, "target_torque": constant * one}
-    return replace(still, current=still.current + one, **targets)
-
-
-def mismatches(still: Recording) -> list[Remark]:
-    return list(controller_findings(still, None))
-
-
-@pytest.mark.parametrize(
-    ("torques", "joints"),
-    [
-        ((0.0, 8.0, 8.0, 0.0, 0.0, 0.0), (2, 3)),
-        ((0.0, 8.0, -8.0, 8.0, 0.0, 0.0), (2, 3, 4)),
-        ((0.0, 4.1, 0.0, -4.1, 0.0, 0.0), (2, 4)),
-        ((0.0, 4.1, 3.9, -3.9, 0.0, 0.0), None),  # one joint alone may be its own drive's
-        ((36.0, 8.0, 0.0, 0.0, 36.0, 36.0), None),  # the base and the wrist do not tell a load
-    ],
-)
-@pytest.mark.parametrize("constant", [0.0, 5.0, 20.0])
-def test_two_heavy_joints_tell_a_load(torques, joints, constant):
-    """Each of more than 4 N·m; an unknown constant is taken for a large drive's, 10 N·m/A."""
-    still = log(*(np.array(torques) / (constant or 10.0)))
-    found = mismatches(with_constants(still, constant) if constant else still)
-    assert [remark.where.joints for remark in found] == ([] if joints is None else [joints])
-
-
-def test_the_numbers_of_a_mismatch():
-    still = with_constants(log(0, 1.0, -2.0, 0.1, 0, 0), 10.0)
-    for payload in (None, 0.0):
-        (finding,) = mismatches(replace(still, payload_mass=payload))
-        assert (finding.code, finding.level) == ("payload-mismatch", "warning")
-        assert finding.where.joints == (2, 3)
-        numbers = {"carried_A": [2.0, -1.0], "expected_A": [1.0, 1.0], "extra_Nm": [10.0, -20.0]}
-        expected = {name: pytest.approx(values) for name, values in numbers.items()}
-        assert dict(finding.values) == expected | {"payload_kg": payload}
-
-
-@pytest.mark.parametrize(("samples", "reported"), [(19, False), (20, True)])
-@pytest.mark.parametrize(
-    ("rest", "motion"),
-    [
-        # measured alone, up to 2 mrad/s
-        ((1.9e-3, None), (2.1e-3, None)),
-        ((-1.9e-3, None), (-2.1e-3, None)),
-        # commanded, which has no noise, up to 2 mrad/s, and measured up to 10
-        ((0.0, 1.9e-3), (0.0, 2.1e-3)),
-        ((9e-3, 0.0), (-11e-3, 0.0)),
-    ],
-)
-def test_a_mismatch_needs_twenty_samples_at_rest(samples, reported, rest, motion):
-    """Speeds at rest and in motion: measured, and commanded if there is any. [rad/s]"""
-    rests = (np.arange(400) < samples)[:, None] & np.ones(6, bool)
-    still = replace(log(0, 1, 1, 0, 0, 0), dq=np.where(rests, rest[0], motion[0]))
-    if rest[1] is not None:
-        still = replace(still, target_dq=np.where(rests, rest[1], motion[1]))
-    assert len(mismatches(still)) == reported
-
-
-@pytest.mark.parametrize("name", ["current", "target_current", "dq"])
-def test_a_mismatch_needs_both_currents_and_a_rest(name):
-    assert not mismatches(replace(log(0, 1, 1, 0, 0, 0), **{name: None}))
-
-
-LOADS = 2 + np.sin(np.outer(T, np.arange(1, 7)))
-"""Slowly changing, 1 to 3 A, as in a series of held poses."""
-OTHER = np.array([11.976, 11.976, 9.839, 7.7, 7.7, 7.7])
-"""The UR10e's, its wrists with the constants of a smaller joint. [N·m/A]"""
-ODD = np.where(np.arange(400) % 2, 1.0, -1.0)[:, None]
-LATE = (np.arange(400) >= 200)[:, None] * np.ones(6)
-
-
-def constants_found(constants, current=LOADS, **changes) -> list[Remark]:
-    """What is reported of a controller of these constants beside the UR10e profile's."""
-    current = np.broadcast_to(current, (400, 6))
-    still = replace(log(0, 0, 0, 0, 0, 0), current=current, target_current=current)
-    still = replace(still, target_torque=current * constants)
-    found = controller_findings(replace(still, **changes), UR10E)
-    return [remark for remark in found if remark.code == "drive-constants"]
-
-
-@pytest.mark.parametrize(
-    ("current", "changes", "known"),
-    [
-        (LOADS, {}, True),
-        (LOADS, {"target_torque": None}, False),
-        (LOADS, {"target_current": None}, False),
-        # of a fiftieth of an ampere and more, in ten samples
-        (0.019, {}, False),
-        (0.021, {}, True),
-        (-0.021, {}, True),
-        ((np.arange(400) < 9)[:, None], {}, False),
-        ((np.arange(400) < 10)[:, None], {}, True),
-        # a twentieth of the torque may be an offset or friction that the drive model adds
-        (1.0, {"target_torque": OTHER * (1 + 0.04 * ODD)}, True),
-        (1.0, {"target_torque": OTHER * (1 + 0.06 * ODD)}, False),
-        # of resting samples only
-        (1.0, {"dq": 0.5 * LATE, "target_torque": OTHER * (1 + 2 * LATE)}, True),
-    ],
-)
-def test_constants_are_the_controller_s_torque_per_current(current, changes, known):
-    found = constants_found(OTHER, current, **changes)
-    assert [remark.where.joints for remark in found] == [(4, 5, 6)] * known
-    for remark in found:
-        assert remark.values["found_Nm_A"] == pytest.approx([7.7] * 3)
-
-
-@pytest.mark.parametrize(
-    ("wrist", "reported"), [(10.9, False), (7.7, True), (7.6, True), (8.5, False)]
-)
-def test_constants_of_another_joint_size_are_reported(wrist, reported):
-    """Of UR's sizes 7.7 N·m/A is one, 10.9 the UR10e's own to 2 %, and 8.5 is none."""
-    found = constants_found(np.where(np.arange(6) == 4, wrist, PROFILE))
-    assert len(found) == reported
-    for remark in found:
-        assert (remark.level, remark.where.joints) == ("warning", (5,))
-        assert dict(remark.values) == {
-            "robot": "ur10e",
-            "found_Nm_A": pytest.approx([wrist]),
-            "profile_Nm_A": pytest.approx([10.763]),
-            "worst_percent": pytest.approx(100 * (1 - wrist / 10.763)),
-        }
-
-
-def test_no_constants_are_compared_without_a_robot_that_has_them():
-    arm = with_constants(log(0, 0, 0, 0, 0, 0), 10.0)
-    assert list(controller_findings(arm, None)) == []
-    assert list(controller_findings(arm, replace(UR10E, torque_constant=None))) == []
 
 
 @pytest.mark.slow

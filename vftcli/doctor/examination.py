@@ -9,7 +9,7 @@ from vftcli.doctor.causes import CORRECTIONS
 from vftcli.doctor.cuts import cut_findings, without_bad_samples
 from vftcli.doctor.fit import RobotMatch, arm_findings, guess_robot
 from vftcli.doctor.lateness import LAGLESS, effort_lag
-from vftcli.doctor.load import controller_findings, temperature_findings
+from vftcli.doctor.load import temperature_findings
 from vftcli.doctor.signals import efforts_of, signal_findings, stuck_findings, unusable_findings
 from vftcli.doctor.velocity import clock_findings, velocity_findings, velocity_fit
 from vftcli.doctor.windows import spread
@@ -124,7 +124,7 @@ def examine(
         best = load_robot(fits[0].robot)
     if any(finding.code in SIZED for finding in by_arm):
         by_signal = [f for f in by_signal if f.code != "milliamperes"]
-    findings = [*cut_findings(recording), *by_signal, *controller_findings(part, best), *by_arm]
+    findings = [*cut_findings(recording), *by_signal, *by_arm]
     if best is not None:
         if not (LAGLESS | REFUSING) & {finding.code for finding in findings}:
             findings += effort_lag(part, best)

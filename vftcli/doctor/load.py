@@ -1,4 +1,4 @@
-"""Findings on load, payload, drive constants and joint temperatures."""
+"""Findings on load, payload and joint temperatures."""
 
 from collections.abc import Iterator
 
@@ -9,21 +9,13 @@ from vftcli.doctor.windows import Case, RobustFit, solve
 from vftcli.robots.friction import friction_factor, measured_temperature, steady_torque
 from vftcli.robots.robot import Robot
 from vftcli.robots.terms import gain_sd
-from vftcli.signals.arrays import Array, Mask
+from vftcli.signals.arrays import Array
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, caution, fact, on_joints, warning
-from vftcli.signals.rest import COMMANDED, MOVES, slower
+from vftcli.signals.rest import MOVES
 
-MISMATCH = 4.0  #: Difference at rest, on two joints, that stiction hardly explains. [N·m]
-#: Torque per current near which every UR's large drives lie. [N·m/A]
-USUAL_CONSTANT = 10.0
-#: Torque per current of UR's joint sizes, e-Series and CB3. [N·m/A]
-JOINT_CONSTANTS = np.array(
-    [3.571, 7.7, 9.839, 10.763, 11.976, 4.545, 9.312, 12.625, 13.13, 15.756]
-)
-SAME = 0.02  #: Scatter of one joint size's constants between firmwares.
-#: Loads in a note, and in a warning: hands weigh .5–1.1, constants 3 % off seem .3 on a
-#: UR10e. [kg]
+#: Loads in a note, and in a warning: hands weigh .5–1.1, constants 3 % off
+#: seem .3. [kg]
 HAND, LOAD = 0.4, 1.2
 SURE = 4.0  #: Least load in SDs by the scatter.
 EXPLAINED, PARTLY = 0.5, 0.8  #: Share of the misfit that such loads may leave.
@@ -35,36 +27,6 @@ CHANGED, CHANGE = 0.6, 0.7
 HALVES, BETWEEN = 0.9, (1 / 3, 2 / 3)
 #: A declared payload, or a difference from the mounted one, that is none. [kg]
 DECLARED = 0.1
-#: Relative difference between the log's drive constants and the profile's in a finding.
-RATIO = 0.05
-
-
-def drive_constants(recording: Recording) -> Array:
-    """Controller's torque per current, target_torque/target_current. (n,) [N·m/A]
-
-    Of resting samples, as friction is fed forward in motion; NaN for a small load.
-    """
-    current, torque = recording.target_current, recording.target_torque
-    constants = np.full(recording.joints, np.nan)
-    if current is None or torque is None:
-        return constants
-    used = resting(recording)[:, None] & (abs(current) > 0.02)
-    for j in np.flatnonzero(used.sum(axis=0) >= 10):
-        i, tau = current[used[:, j], j], torque[used[:, j], j]
-        # Through the origin: no current, no torque.
-        slope = i @ tau / (i @ i)
-        # A joint that carries nothing has a target of zero and shows no constant.
-        if np.std(tau - slope * i) < 0.05 * max(tau.std(), abs(tau).mean()):
-            constants[j] = slope
-    return constants
-
-
-def resting(recording: Recording) -> Mask:
-    """Samples in which no joint moves. (T,)"""
-    if recording.dq is None:
-        return np.zeros(recording.samples, bool)
-    speed = recording.dq if recording.target_dq is None else recording.target_dq
-    return np.asarray((slower(speed, COMMANDED) & slower(recording.dq)).all(axis=1))
 
 
 def load_remarks(case: Case) -> Iterator[Remark]:
@@ -106,10 +68,10 @@ def load_remarks(case: Case) -> Iterator[Remark]:
 
 
 def masses_sd(case: Case, fit: RobustFit, loads: Array) -> Array:
-    """Deviations of masses by scatter, drive constants and usual errors of links. (k,) [kg]
+    """SDs of masses by scatter, drive constants and usual errors of links. (k,) [kg]
 
-    `loads` are the columns (W, m, 4k) of k loads, which the fit begins with. Of 30 loads of
-    simulated arms 28 are within 95 % bands, errors 1.0 deviations rms.
+    `loads` are the columns (W, m, 4k) of k loads, which the fit begins with. Of 30
+    simulated loads 28 are within 95 % bands.
     """
     log, masses = case.windows, slice(None, loads.shape[2], 4)
     fitted = np.concatenate([loads, log.friction.columns], axis=2)[fit.kept]
@@ -146,53 +108,6 @@ def load_change(case: Case) -> Remark | None:
         return None
     at, sd = case.windows.t[split, 0], masses_sd(case, fit, loads).max()
     return warning("load-changes", first_kg=before, last_kg=after, sd_kg=sd, at_s=at)
-
-
-def controller_findings(recording: Recording, robot: Robot | None) -> Iterator[Remark]:
-    """Payload mismatch at rest; drive constants of controller and robot file."""
-    constants = drive_constants(recording)
-    yield from payload_mismatch(recording, constants)
-    if robot is None or robot.torque_constant is None or robot.joints != recording.joints:
-        return
-    profile = robot.torque_constant
-    ratio = constants / profile - 1
-    # Freedrive and old controllers do not follow K·i.
-    real = (abs(constants[:, None] / JOINT_CONSTANTS - 1) < SAME).any(axis=1)
-    wrong = abs(ratio) > RATIO
-    if wrong.any() and real[wrong].all():
-        yield warning(
-            "drive-constants",
-            on_joints(wrong),
-            robot=robot.name,
-            found_Nm_A=constants[wrong],
-            profile_Nm_A=profile[wrong],
-            worst_percent=100 * np.nanmax(abs(ratio)),
-        )
-
-
-def payload_mismatch(recording: Recording, constants: Array) -> Iterator[Remark]:
-    """Drives that carry another current at rest than the controller expects.
-
-    The log's own drive constants are NaN if unknown. (n,) [N·m/A]
-    """
-    rest = resting(recording)
-    current, expected = recording.current, recording.target_current
-    if current is None or expected is None or rest.sum() < 20:
-        return
-    carried, wanted = current[rest].mean(axis=0), expected[rest].mean(axis=0)
-    torque = (carried - wanted) * np.where(np.isfinite(constants), constants, USUAL_CONSTANT)
-    # Only shoulder, elbow and the next joint show a load.
-    heavy = np.flatnonzero(abs(torque[1:4]) > MISMATCH) + 1
-    if heavy.size < 2:
-        return
-    yield warning(
-        "payload-mismatch",
-        on_joints(heavy),
-        carried_A=carried[heavy],
-        expected_A=wanted[heavy],
-        extra_Nm=torque[heavy],
-        payload_kg=recording.payload_mass,
-    )
 
 
 #: Share of friction lost a kelvin: UR's sizes .011–.022.

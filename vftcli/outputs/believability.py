@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 
 #: Subject → its findings; any other is about the drives' effort.
 SUBJECTS = {
-    "load": ("unmodelled-load", "light-load", "payload-mismatch", "payload-not-mounted",
+    "load": ("unmodelled-load", "light-load", "payload-not-mounted",
              "payload-not-carried", "load-changes"),
     "robot": ("other-robot", "no-robot-fits", "no-robot-fits-any", "no-profile"),
     "time stamps": ("time-unit", "clock-rate", "slow-rate", "gaps", "repeated-stamps",
@@ -56,7 +56,7 @@ SUBJECTS = {
     "vendor's torque": ("vendor-sign", "zero-tau-ext"),
 }  # fmt: skip
 #: Findings that ``identify --method payload`` answers.
-LOADS = {"unmodelled-load", "light-load", "payload-mismatch", "contact-is-load"}
+LOADS = {"unmodelled-load", "light-load", "contact-is-load"}
 
 
 #: Remark of a list of contacts → its subject.

@@ -9,8 +9,6 @@ from vftcli.signals.arrays import Array, Mask, grown, median_step, runs_of, summ
 
 #: Above it, more than noise and last digits, a joint has a direction: a log moves. [rad/s]
 NONZERO = 1e-3
-#: Below it a controller holds a joint: what it commands has no noise. [rad/s]
-COMMANDED = 2e-3
 #: Below it stiction holds the joint: above noise, up to an encoder's steps over 24 ms. [rad/s]
 REST = 0.01
 MOVES = 0.02  #: Above it, twice that, no noise is motion: friction is that of motion. [rad/s]
