@@ -9,7 +9,7 @@ from vftcli.identification.payload import (
     REACH,
     STRETCHES,
     NotSameMotionError,
-    find_time_shift,
+    alignment_of_pair,
     fit_all_joints,
     load_at_flange,
     load_friction,
@@ -110,17 +110,6 @@ def swinging(shift=0.0, bend=0.0, seconds=12.0):
     return t, q, dq
 
 
-@pytest.mark.parametrize("shift", [0.0, 0.237, -1.41])
-def test_the_shift_between_two_logs_is_found(prepared, shift):
-    t, q, dq = swinging(shift)
-    motion = prepared(t, q=q, dq=dq)
-    other = Recording(t=t, q=swinging()[1], dq=dq, torque=0 * q)
-    found, distance = find_time_shift(motion, other)
-    # steps of 0.5 ms, interpolation of a 10 ms clock
-    assert found == pytest.approx(shift, abs=5e-4)
-    assert distance < 1e-3
-
-
 def test_a_pair_that_moves_by_its_positions_alone_is_refused_in_one_line():
     """All velocities are zero, as of a driver that leaves them out: no motion is left to fit."""
     t, q, _ = swinging()
@@ -129,14 +118,17 @@ def test_a_pair_that_moves_by_its_positions_alone_is_refused_in_one_line():
         payload_from_pair(silent, replace(silent), load_robot("ur5"))
 
 
-def test_another_motion_is_no_pair(prepared):
+def test_another_motion_is_no_pair():
     t, q, dq = swinging()
-    bent = Recording(t=t, q=swinging(bend=0.03)[1], dq=dq, torque=0 * q)
+    log = Recording(t=t, q=q, dq=dq, torque=0 * q)
     # .03 rad in one of six joints is .03/√12 = 8.7 mrad rms: more than 5 mrad
     with pytest.raises(NotSameMotionError, match="different motions: positions differ by 8"):
-        find_time_shift(prepared(t, q=q, dq=dq), bent)
-    near = Recording(t=t, q=swinging(bend=0.015)[1], dq=dq, torque=0 * q)
-    assert find_time_shift(prepared(t, q=q, dq=dq), near)[1] == pytest.approx(4.3e-3, rel=0.05)
+        alignment_of_pair(log, replace(log, q=swinging(bend=0.03)[1]))
+    near = alignment_of_pair(log, replace(log, q=swinging(bend=0.015)[1]))
+    assert near.deviation == pytest.approx(4.3e-3, rel=0.05)
+    # one motion 1 % slower is another
+    with pytest.raises(NotSameMotionError, match="different motions"):
+        alignment_of_pair(log, replace(log, t=1.01 * t))
 
 
 @pytest.mark.parametrize("swap", [False, True])

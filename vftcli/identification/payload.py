@@ -6,9 +6,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from vftcli.free_motion.alignment import Alignment, aligned_at, best_fit
 from vftcli.free_motion.free_motion import LEAST, PARTLY, SURE, columns, with_point_mass
 from vftcli.identification.shapes import round_digits
-from vftcli.identification.training import STATIC, PreparedLog, load_columns, prepare
+from vftcli.identification.training import STATIC, load_columns, prepare
 from vftcli.readers.table import listed
 from vftcli.robots.chain import Payload
 from vftcli.robots.friction import SMOOTHING
@@ -22,7 +23,6 @@ from vftcli.signals.arrays import (
     Indices,
     intervals,
     resample_columns,
-    root_mean_square,
     root_mean_squares,
 )
 from vftcli.signals.errors import IdentificationError
@@ -34,7 +34,6 @@ from vftcli.signals.rest import faster, held
 
 PASSES = 3  #: Fits, each with the joints' residuals of the last one.
 SAME_MOTION = 5e-3  #: Largest difference of one motion's logs. [rad rms]
-COARSE, FINE = 0.05, 5e-4  #: Steps of the search for the shift between two logs. [s]
 DWELL = 0.5  #: Shortest rest that is a pose. [s]
 POSES = 4  #: Fewest different poses for mass and centre of mass.
 APART = 0.1  #: A joint differs by this between two poses. [rad]
@@ -159,9 +158,13 @@ def payload_from_pair(first: Recording, second: Recording, robot: Robot) -> Load
     """A load from one motion with and without it, in either order."""
     for loaded, free in ((second, first), (first, second)):
         motion, t = prepare(loaded, robot), free.t
-        shift, distance = find_time_shift(motion, free)
+        if not len(motion.t):
+            raise NotSameMotionError(
+                f"no joint of {loaded.name} moves; a pair must repeat one trajectory"
+            )
+        found = alignment_of_pair(loaded, free)
         torque = zero_phase(t, drive_torque(free, robot), motion.cutoff)
-        at = motion.t + shift
+        at = motion.t + found.shift
         inside = (at >= t[0]) & (at <= t[-1])
         extra = motion.tau - resample_columns(at, t, torque)
         sign = motion.filtered(np.tanh(loaded.require("dq") / SMOOTHING))
@@ -176,8 +179,8 @@ def payload_from_pair(first: Recording, second: Recording, robot: Robot) -> Load
         if fit.x[0] >= 0:
             break
     sd = np.sqrt(np.diag(fit.motion_covariance(extra, gain_sd(loaded, robot))))[:STATIC]
-    values = {"loaded": loaded.name, "free": free.name, "distance_mrad": 1e3 * distance}
-    origin = Remark("load-from-pair", values={**values, "shift_s": round(-shift, 3) + 0.0})
+    values = {"loaded": loaded.name, "free": free.name, "distance_mrad": 1e3 * found.deviation}
+    origin = Remark("load-from-pair", values={**values, "shift_s": round(-found.shift, 3) + 0.0})
     x = fit.x[:STATIC]
     return load_at_flange(x, sd, root_mean_squares(fit.left), robot, (loaded,), origin)
 
@@ -189,33 +192,16 @@ def load_friction(robot: Robot, q: Array, sign: Array, x: Array) -> Array:
     return ((abs(after) - abs(before)) * sign)[:, :, None] * np.eye(robot.joints)
 
 
-def find_time_shift(motion: PreparedLog, other: Recording) -> tuple[float, float]:
-    """Shift [s] from the motion's clock to the other's, and rest. [rad rms]"""
-    if not len(motion.t):
-        name = motion.recording.name
-        raise NotSameMotionError(f"no joint of {name} moves; a pair must repeat one trajectory")
-
-    def distance(shift: float) -> float:
-        at = motion.t + shift
-        inside = (at >= other.t[0]) & (at <= other.t[-1])
-        # Short ends may agree by chance: half of the motion must overlap.
-        if np.count_nonzero(inside) < 0.5 * len(at):
-            return np.inf
-        there = resample_columns(at[inside], other.t, other.q)
-        return root_mean_square(there - motion.q[inside])
-
-    high = other.t[-1] - motion.t[0]
-    # The distance has many minima: try the whole range, then refine.
-    best = min(np.arange(other.t[0] - motion.t[-1], high, COARSE), key=distance)
-    for step in (COARSE / 5, COARSE / 25, FINE):
-        best = min(best + step * np.arange(-6, 7), key=distance)
-    left = distance(best)
-    if left > SAME_MOTION:
+def alignment_of_pair(loaded: Recording, free: Recording) -> Alignment:
+    """Alignment of two logs of one motion, at equal clock rates."""
+    shift, rate = best_fit(loaded, free)
+    found = aligned_at(loaded, free, shift + (rate - 1.0) * loaded.t.mean(), 1.0)
+    if found.deviation > SAME_MOTION:
         raise NotSameMotionError(
-            f"{motion.recording.name} and {other.name} are different motions: positions differ "
-            f"by {1e3 * left:.3g} mrad rms at best; a pair must repeat one trajectory"
+            f"{loaded.name} and {free.name} are different motions: positions differ by "
+            f"{1e3 * found.deviation:.3g} mrad rms at best; a pair must repeat one trajectory"
         )
-    return best, left
+    return found
 
 
 def payload_from_poses(recordings: Sequence[Recording], robot: Robot) -> LoadFit:
