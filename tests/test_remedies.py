@@ -383,7 +383,7 @@ def typed(option: str, value: object) -> list[Any]:
 WITHOUT_ROW = {
     "the reader refuses such a file first; only a log made in memory gets as far": (
         "absurd-clock", "absurd-steps", "absurd-values"),
-    "names a command; tried below": ("apparent-load", "effort-offset"),
+    "names a command; tried below": ("effort-offset",),
     "asks for a log with other numbers": ("current-without-gravity",),
     "which columns hold the effort is the user's to say": ("effort-unexplained",),
     "says which option did it, or what not to do; there is nothing to mend": (

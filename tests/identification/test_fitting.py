@@ -11,9 +11,7 @@ from vftcli.free_motion.free_motion import PARTLY
 from vftcli.identification import Task
 from vftcli.identification.fitting import (
     Trace,
-    held_out_remarks,
     identify,
-    joint_remark,
     repeated_share,
     score_remarks,
 )
@@ -389,48 +387,6 @@ def test_a_load_on_the_flange_is_named(sine_motion, mass):
     # m, m·c alone are fitted; the point mass's own tensor about the last frame is 2e-3 of it
     assert found == pytest.approx(mass, rel=0.02)
     assert share > 0.99
-    (remark,) = held_out_remarks(trace(sine_motion, residual), np.full(6, 0.01))
-    assert remark.code == "apparent-load"
-    assert dict(remark.values) == {"mass_kg": found, "share_percent": 100.0 * share}
-
-
-def test_no_remark_where_the_score_is_that_of_the_training(sine_motion):
-    residual = np.ones_like(sine_motion.q)
-    assert not list(held_out_remarks(trace(sine_motion, residual), np.full(6, 0.67)))
-    assert list(held_out_remarks(trace(sine_motion, residual), np.full(6, 0.66)))  # > 1.5 ×
-
-
-@pytest.mark.parametrize(("sign", "code"), [(1.0, "more-friction"), (-1.0, "less-friction")])
-def test_friction_is_named_as_a_cause(sine_motion, sign, code):
-    dq = sine_motion.dq[:, 2]
-    rubbing = sine_motion.filtered(np.column_stack([np.tanh(dq / 0.01), dq])) @ [1.5, 0.5]
-    residual = np.zeros_like(sine_motion.q)
-    residual[:, 2] = sign * rubbing
-    remark = joint_remark(trace(sine_motion, residual), 2, 0.1)
-    assert (remark.code, remark.where.joints) == (code, (3,))
-    speed = np.sqrt(np.mean(dq[np.abs(dq) > 0.02] ** 2))
-    assert remark.values["speed_rad_s"] == pytest.approx(speed)
-    assert remark.values["friction_Nm"] == pytest.approx(1.5 + 0.5 * speed, rel=1e-6)
-    assert remark.values["share_percent"] == pytest.approx(100.0)
-    assert remark.values["ratio"] == pytest.approx(remark.values["rms_Nm"] / 0.1)
-
-
-def test_the_share_of_a_cause_is_that_of_the_mean_square(sine_motion):
-    """Friction of 2 N·m beside noise of 1 N·m: four fifths, less what is smoothed at reversals."""
-    residual = np.random.default_rng(3).standard_normal(sine_motion.q.shape)
-    residual[:, 2] += 2.0 * np.sign(sine_motion.dq[:, 2])
-    remark = joint_remark(trace(sine_motion, residual), 2, 0.1)
-    assert remark.values["share_percent"] == pytest.approx(80.0, abs=4.0)
-
-
-def test_joints_that_rest_say_nothing(sine_motion, prepared):
-    dq = sine_motion.dq.copy()
-    dq[:, 4] = 0.0
-    noise = np.random.default_rng(1).standard_normal(dq.shape)
-    still = prepared(sine_motion.t, q=sine_motion.q, dq=dq, ddq=sine_motion.ddq)
-    remarks = list(held_out_remarks(trace(still, noise), np.full(6, 0.1)))
-    assert [r.where.joints for r in remarks if r.code == "resting-joints"] == [(5,)]
-    assert sum(r.code == "larger-residual" for r in remarks) == 5
 
 
 def test_the_share_of_a_repeated_path(prepared, sines):

@@ -24,20 +24,16 @@ from vftcli.identification.targets import targets_method
 from vftcli.identification.training import (
     PreparedLog,
     Training,
-    apparent_load,
     prepare,
     prepare_training,
     settings_record,
 )
-from vftcli.robots.friction import SMOOTHING
 from vftcli.robots.profile import robot_document
 from vftcli.robots.robot import Robot
 from vftcli.robots.terms import effort_name
-from vftcli.signals.arrays import Array, resample_columns, root_mean_square, root_mean_squares
-from vftcli.signals.estimation import fit_column
+from vftcli.signals.arrays import Array, resample_columns, root_mean_squares
 from vftcli.signals.recording import Recording, refuse_repeated_logs
-from vftcli.signals.remarks import Remark, Where, caution, fact, on_joints
-from vftcli.signals.rest import faster
+from vftcli.signals.remarks import Remark, Where, caution, fact
 
 #: Name at the command line → method; None chooses between the first two.
 FITS: dict[str | None, Callable[[Training], MethodResult]] = {
@@ -52,10 +48,6 @@ RESIDUALS = pl.Schema(
     {"log": str, "log_index": int, "role": str, "model": str}
     | {"joint": int, "rms_Nm": float, "samples": int}
 )
-EXPLAINS = 0.4  #: Least share of a residual that a named cause explains.
-HEAVY = 0.3  #: Smallest load of a remark. [kg]
-ENOUGH = 50  #: Fewest samples in motion for a remark on friction.
-WORSE = 1.5  #: Least multiple of the training's residual in a remark.
 #: Least ratio of the model's rest of a log to the profile's in a remark.
 BEHIND = 1.01
 NEAR = 0.01  #: Largest joint distance of samples at one place. [rad]
@@ -127,7 +119,7 @@ def score(log: Recording, role: str, profile: Robot, robot: Robot, cutoff: float
 
 
 def score_remarks(traces: Sequence[Trace]) -> Iterator[Remark]:
-    """Remarks on worse or repeated logs, and on worse joints."""
+    """Remarks on worse or repeated logs, and the training residual."""
     train, held_out = ([t for t in traces if t.role == role] for role in ("train", "held-out"))
     for trace in traces:
         left, before = trace.rms.mean(), trace.before.mean()
@@ -141,50 +133,8 @@ def score_remarks(traces: Sequence[Trace]) -> Iterator[Remark]:
                 values = {"training_log": other.recording.name, "share_percent": 100.0 * share}
                 yield caution("repeated-trajectory", test.where, **values)
     if train:
-        level = np.mean([trace.rms for trace in train], axis=0)
-        for test in held_out:
-            yield from held_out_remarks(test, level)
-        yield fact("training-residual", mean_Nm=level.mean())
-
-
-def held_out_remarks(trace: Trace, trained: Array) -> Iterator[Remark]:
-    """Causes of a held-out residual far above the training's. (n,) [N·m]"""
-    motion, worse = trace.motion, trace.rms > WORSE * trained
-    if not worse.any():
-        return
-    # A load on the flange explains all joints at once.
-    mass, explained = apparent_load(motion, trace.residual)
-    if explained > EXPLAINS and abs(mass) > HEAVY:
-        yield caution("apparent-load", trace.where, mass_kg=mass, share_percent=100.0 * explained)
-        return
-    moving = np.count_nonzero((motion.weights > 0) & faster(motion.dq), axis=0) >= ENOUGH
-    for j in np.flatnonzero(worse & moving).tolist():
-        yield joint_remark(trace, j, trained[j])
-    if (resting := worse & ~moving).any():
-        yield fact("resting-joints", on_joints(resting, motion.recording.name))
-
-
-def joint_remark(trace: Trace, j: int, trained: float) -> Remark:
-    """Whether friction explains joint j's (from 0) residual beyond training's.
-
-    Coulomb and viscous friction and an offset must explain `EXPLAINS` of it.
-    """
-    motion, residual, size = trace.motion, trace.residual, trace.rms[j]
-    where = on_joints([j], motion.recording.name)
-    values = {"rms_Nm": size, "ratio": size / trained}
-    dq = motion.recording.require("dq")[:, j]
-    used = ((motion.weights > 0) & faster(motion.dq))[:, j]
-    sign = np.tanh(dq / SMOOTHING)
-    A = np.column_stack([motion.filtered(np.column_stack([sign, dq])), np.ones(motion.samples)])
-    fit = fit_column(A, residual[:, j], used.astype(float))
-    left = np.mean(fit.residual[used] ** 2)
-    explained = 1.0 - left / max(np.mean(residual[used, j] ** 2), 1e-12)
-    if explained < EXPLAINS:
-        return caution("larger-residual", where, **values)
-    speed = root_mean_square(motion.dq[used, j])
-    more = fit.values[0] + fit.values[1] * speed
-    values |= {"friction_Nm": abs(more), "speed_rad_s": speed, "share_percent": 100.0 * explained}
-    return caution("more-friction" if more > 0 else "less-friction", where, **values)
+        level = np.mean([trace.rms for trace in train])
+        yield fact("training-residual", mean_Nm=level)
 
 
 def repeated_share(train: PreparedLog, test: PreparedLog) -> float:
