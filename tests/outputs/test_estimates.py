@@ -1,9 +1,9 @@
+import json
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import polars as pl
-import pyarrow.parquet as pq
 import pytest
 
 from vftcli.analysis import Analysis
@@ -25,12 +25,11 @@ def test_parquet_holds_flat_float_columns(analysis: Analysis, tmp_path: Path) ->
             column = table[f"tau_ext/{estimate.name}/{j + 1}"].to_numpy()
             np.testing.assert_array_equal(column, estimate.tau[:, j])
     np.testing.assert_array_equal(table["t"].to_numpy(), analysis.t)
-    schema = pq.read_schema(tmp_path / "e.parquet")
-    assert all((field.metadata or {}).get(b"unit") for field in schema)
-    force = {k.decode(): v.decode() for k, v in schema.field("wrench/best/fz").metadata.items()}
-    assert (force["unit"], force["sign"]) == ("N", "on the robot")
-    assert force["frame"] == "flange axes, moment about the flange point"
-    assert schema.field("tau_ext/gmo/2").metadata[b"unit"] == "N·m".encode()
+    found = json.loads(pl.read_parquet_metadata(tmp_path / "e.parquet")["vftcli"])
+    assert {name.partition("/")[0] for name in table.columns} == set(found["columns"])
+    assert found["columns"]["wrench"] == "N and N·m, on the robot"
+    assert found["columns"]["tau_ext"] == "N·m, on the robot"
+    assert found["frames"]["best"] == "flange axes, moment about the flange point"
 
 
 def test_unknown_is_null_or_no_column(analysis: Analysis, without_reference: Analysis) -> None:

@@ -6,11 +6,9 @@ from xml.etree import ElementTree as ET
 
 import numpy as np
 import polars as pl
-import pyarrow.parquet as pq
 import pytest
 
 from vftcli.robots import load_robot
-from vftcli.signals.columns import StatedFrame, column_facts, described_schema
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.recording import Recording, Source
 from vftcli.signals.remarks import Remark, Remarks, caution, fact
@@ -125,41 +123,3 @@ def test_a_frame_keeps_whole_numbers() -> None:
     frame = frame_of([("k", np.arange(3)), ("x", np.array([1.0, np.nan, 2.0]))])
     assert frame["k"].dtype == pl.Int64
     assert frame["x"].to_list() == [1.0, None, 2.0]
-
-
-FLANGE = "flange axes, moment about the flange point"
-FRAMES = {"wrench/best": StatedFrame(FLANGE), "wrench": StatedFrame("base axes", "by-robot")}
-
-
-@pytest.mark.parametrize(
-    ("name", "unit", "more"),
-    [
-        ("t", "s", {}),
-        ("t_src_ns", "ns", {}),
-        ("q/3", "rad", {"joint": "3"}),
-        ("tau_ext/kfo-fe/6", "N·m", {"joint": "6", "sign": "on the robot"}),
-        ("wrench/best/fx", "N", {"sign": "on the robot", "frame": FLANGE}),
-        ("wrench/mz", "N·m", {"sign": "by-robot", "frame": "base axes"}),
-        ("wrench/gmo/mz", "N·m", {}),
-        ("wrench_sd/best/mx", "N·m", {}),
-        ("sigma_min", "m", {}),
-        ("contact", "1", {}),
-        ("contact/hand/fy", "N", {}),
-        ("contact/drift/2", "N·m", {"joint": "2"}),
-    ],
-)
-def test_a_column_says_what_it_holds(name: str, unit: str, more: dict[str, str]) -> None:
-    facts = column_facts(name, FRAMES)
-    assert facts.pop("meaning")
-    assert facts == {"unit": unit} | more
-    assert column_facts("odd/1", {}) == column_facts("", {}) == {}
-
-
-def test_the_file_says_it(tmp_path: Path) -> None:
-    table = pl.DataFrame({"t": [0.0, 0.1], "odd": ["a", "b"], "t_src_ns": [1, 2]})
-    table.write_parquet(tmp_path / "x.parquet", arrow_schema=described_schema(table))
-    schema = pq.read_schema(tmp_path / "x.parquet")
-    assert schema.field("t").metadata == {b"unit": b"s", b"meaning": b"time"}
-    assert schema.field("odd").metadata is None
-    assert schema.field("t_src_ns").metadata[b"unit"] == b"ns"
-    assert pl.read_parquet(tmp_path / "x.parquet").equals(table)

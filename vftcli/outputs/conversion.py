@@ -4,7 +4,6 @@ An MCAP holds ROS 2 messages, with the topics in docs/outputs.md. All are CDR: J
 ros2 file stops rosbags' reader.
 """
 
-import json
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -19,9 +18,8 @@ from vftcli.outputs.run_record import envelope, seal
 from vftcli.readers.bags.decode import long_name
 from vftcli.robots.terms import drive_torque
 from vftcli.signals.arrays import Array
-from vftcli.signals.columns import StatedFrame
 from vftcli.signals.errors import OutputError
-from vftcli.signals.recording import COLUMN_NAMES, JOINT_SIGNALS, Recording
+from vftcli.signals.recording import COLUMN_NAMES, JOINT_SIGNALS, Recording, units_of
 from vftcli.simulation.writers.rosbag2 import Value, schema_text, serialised, six, stamped
 
 if TYPE_CHECKING:
@@ -161,9 +159,10 @@ def flat_table(recording: Recording) -> "pl.DataFrame":
 
 
 def write_parquet(recording: Recording, path: Path) -> None:
-    """Write flat columns; joint names, frame … in the metadata."""
+    """Write flat columns; units, joint names, frame … in the metadata."""
     frame = recording.wrench_frame
     metadata = {
+        "columns": {"t_src_ns": "ns", **units_of(recording.signals)},
         "format": recording.source.format,
         "sha256": recording.source.sha256,
         "joint_names": recording.joint_names,
@@ -171,8 +170,7 @@ def write_parquet(recording: Recording, path: Path) -> None:
         "robot": recording.robot_hint,
         "repairs": list(map(str, recording.source.repairs)),
     }
-    stated = {"wrench": StatedFrame(str(frame), frame.sign)} if frame is not None else None
-    put_table(path, flat_table(recording), stated, metadata={"vftcli": json.dumps(metadata)})
+    put_table(path, flat_table(recording), metadata)
 
 
 def write_csv(recording: Recording, path: Path) -> None:

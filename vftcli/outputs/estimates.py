@@ -9,12 +9,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from vftcli.analysis import Analysis
-from vftcli.outputs import PLAIN, OutputChoice
+from vftcli.outputs import PLAIN, OutputChoice, Record
 from vftcli.outputs.examination import overridden_lines
 from vftcli.outputs.files import SEAL, OutputFolder, numbered, table_file
 from vftcli.outputs.run_record import run_record, seal
 from vftcli.signals.arrays import Array
-from vftcli.signals.columns import StatedFrame, described_schema
 from vftcli.signals.packages import needed
 from vftcli.signals.progress import steps
 from vftcli.signals.shown import ALL, frame_of, per_joint
@@ -25,6 +24,21 @@ if TYPE_CHECKING:
     import polars as pl
 
 
+#: First part of a column's name → its unit, and the sign of a torque or a wrench.
+UNITS = {
+    "t": "s",
+    "q": "rad",
+    "dq": "rad/s",
+    "tau_ext": "N·m, on the robot",
+    "sd": "N·m",
+    "band": "N·m",
+    "wrench": "N and N·m, on the robot",
+    "wrench_sd": "N and N·m",
+    "wrench_masked": "N and N·m, on the robot",
+    "null_space": "N·m, on the robot",
+    "sigma_min": "m",
+    "contact": "number in the list of contacts",
+}
 #: An analysis and its rows; None for the whole log, after its blocks.
 Group = tuple[Analysis, slice | None]
 GROUP_ROWS = 1 << 15  #: Rows of a group of a table.
@@ -33,8 +47,8 @@ GROUP_ROWS = 1 << 15  #: Rows of a group of a table.
 def estimates_table(analysis: Analysis, rows: slice = ALL) -> "pl.DataFrame":
     """Time, motion, every torque, wrenches: one flat column each.
 
-    docs/outputs.md lists them, each field's metadata states its unit. Of a wrench there are
-    also ``null_space/<observer>`` [N·m], and by the solver ``map`` the masked samples as
+    docs/outputs.md lists them. Of a wrench there are also ``null_space/<observer>`` [N·m],
+    and by the solver ``map`` the masked samples as
     ``wrench_masked/<observer>/fx``…. Unknown values are null.
     """
     return frame_of(columns(analysis, rows))
@@ -103,14 +117,8 @@ def write_groups(path: Path, groups: Iterable[Group], csv: Path | None = None) -
                 continue
             table = estimates_table(analysis, rows)
             if schema is None:
-                frames = {
-                    f"{kind}/{wrench.name}": StatedFrame(FRAMES[wrench.frame])
-                    for wrench in analysis.wrenches
-                    for kind in ("wrench", "wrench_sd", "wrench_masked")
-                }
-                doubts = overridden_lines(analysis.examinations)
-                about = {"vftcli": json.dumps({"overridden": doubts})} if doubts else {}
-                schema = described_schema(table, frames, about)
+                about = json.dumps(statement(analysis, table.columns))
+                schema = table.to_arrow().schema.with_metadata({"vftcli": about})
                 writer = ParquetWriter(file, schema, write_statistics=False, **how)
                 files.enter_context(writer)
                 if csv is not None:
@@ -121,6 +129,16 @@ def write_groups(path: Path, groups: Iterable[Group], csv: Path | None = None) -
             if csv is not None:
                 table.write_csv(text, include_header=False, float_precision=9)
     return analysis
+
+
+def statement(analysis: Analysis, columns: Iterable[str]) -> Record:
+    """Units and signs of the table's columns, frames of its wrenches, what was overridden."""
+    kinds = dict.fromkeys(name.partition("/")[0] for name in columns)
+    return {
+        "columns": {kind: UNITS[kind] for kind in kinds},
+        "frames": {wrench.name: FRAMES[wrench.frame] for wrench in analysis.wrenches},
+        "overridden": overridden_lines(analysis.examinations),
+    }
 
 
 #: Flag → name of its file.

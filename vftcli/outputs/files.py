@@ -22,7 +22,6 @@ from tempfile import TemporaryFile
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self
 
-from vftcli.signals.columns import StatedFrame, described_schema
 from vftcli.signals.errors import OutputError
 from vftcli.signals.parsing import whole
 
@@ -87,16 +86,11 @@ def table_file(path: Path) -> Iterator[Path]:
         raise unwritable(Path(path.name), OSError(why)) from None
 
 
-def put_table(
-    path: Path,
-    table: "pl.DataFrame",
-    frames: Mapping[str, StatedFrame] | None = None,
-    **how: Any,  # noqa: ANN401 - of `write_parquet`
-) -> None:
-    """Write a table as Parquet, with each column's meaning."""
-    schema = described_schema(table, frames)
+def put_table(path: Path, table: "pl.DataFrame", about: Mapping[str, Any] | None = None) -> None:
+    """Write a table as Parquet, with what is said about it as the file's metadata."""
+    stated = {"vftcli": json.dumps(about)} if about else None
     with table_file(path) as file:
-        table.write_parquet(file, compression="zstd", arrow_schema=schema, **how)
+        table.write_parquet(file, compression="zstd", metadata=stated)
 
 
 def write_text(path: Path, text: str, force: bool = False) -> None:

@@ -48,6 +48,7 @@ from vftcli.signals.recording import Recording
 from vftcli.signals.shown import frame_of, per_joint
 from vftcli.signals.wrench import per_axis
 from vftcli.simulation import load_scenario, simulate
+from vftcli.simulation.writers import TRUTH_COLUMNS
 
 
 @dataclass
@@ -228,7 +229,7 @@ def write_log(log: BenchmarkLog, base: BenchmarkLog, command: str, path: Path) -
         read = choice.library.open(base.paths[0], replace(choice.read, derive="none"))
         recording, wrench, tau = planted(prepared(read, choice), log.pushes)
         table = (("t", recording.t), *per_joint("tau_ext", tau), *per_axis("wrench", wrench))
-        put_table(companions(path)[0], frame_of(table))
+        put_table(companions(path)[0], frame_of(table), {"columns": TRUTH_COLUMNS})
         convert(recording, path, force=True)
     elif log.scenario:
         check_installed("pinocchio", "a simulated log")

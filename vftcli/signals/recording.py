@@ -111,7 +111,7 @@ class Source(Shown):
 IN_MEMORY = Source()  #: Of a recording that was made in memory.
 
 
-#: Fields of a Recording that hold a signal → its unit and what it is.
+#: Fields of a Recording that hold a signal → its unit, with its sign, and what it is.
 SIGNALS = {
     "q": ("rad", "joint positions"),
     "dq": ("rad/s", "joint velocities"),
@@ -122,7 +122,7 @@ SIGNALS = {
     "target_dq": ("rad/s", "target velocities"),
     "target_current": ("A", "target currents"),
     "target_torque": ("N·m", "target torques"),
-    "tau_ext": ("N·m", "vendor estimates of the external torque"),
+    "tau_ext": ("N·m, on the robot", "vendor estimates of the external torque"),
     "temperature": ("°C", "joint temperatures"),
     "wrench": ("N and N·m", "wrenches"),
 }
@@ -133,6 +133,13 @@ JOINT_SIGNALS = tuple(name for name in MEANINGS if name != "wrench")
 COLUMN_NAMES = {"torque": "tau"}
 #: Those that say what the drives do; a log has one of them or several.
 EFFORTS = ("current", "torque", "torque_without_gravity")
+
+
+def units_of(signals: Iterable[str]) -> dict[str, str]:
+    """Units of a table's columns: of the time, and of these signals."""
+    return {"t": "s", **{COLUMN_NAMES.get(name, name): SIGNALS[name][0] for name in signals}}
+
+
 #: Signals that an examination looks at beside time and positions.
 EXAMINED = frozenset(
     ("dq", *EFFORTS, "target_dq", "target_current", "target_torque", "tau_ext", "temperature")

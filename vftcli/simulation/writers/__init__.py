@@ -5,6 +5,7 @@ SDU's ur_rtde commas, LF, six decimals. libfranka's `logToCSV` since 0.9.1: comm
 significant digits.
 """
 
+import json
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -15,10 +16,10 @@ from numpy.typing import NDArray
 from vftcli.robots.robot import Robot
 from vftcli.robots.terms import gravity_torque
 from vftcli.signals.arrays import Array
-from vftcli.signals.columns import StatedFrame, described_schema
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.parsing import check_known
 from vftcli.signals.pose import log_matrix
+from vftcli.signals.recording import units_of
 from vftcli.signals.shown import per_joint
 from vftcli.signals.wrench import per_axis
 from vftcli.simulation.experiment import FlangeMotion, Simulation, Truth
@@ -89,9 +90,13 @@ FRANKA: Columns = {
 #: The short recipe of a UR log: joint motion, currents and the target moment alone.
 SHORT = ("timestamp", "target_q", "target_qd", "target_current", "target_moment", "actual_q",
          "actual_qd", "actual_current")  # fmt: skip
-TRUTH_FRAME = "base axes, moment about the flange point"  #: Of the truth's wrench.
-#: Of the wrench of one contact elsewhere on the arm.
-AT_CONTACT = "base axes, moment about the point that is touched"
+#: Units, signs and frames of the truth's columns.
+TRUTH_COLUMNS = {
+    "t": "s",
+    "tau_ext": "N·m, on the robot",
+    "wrench": "N and N·m, on the robot, base axes, moment about the flange point",
+    "contact": "N and N·m, on the robot, base axes, moment about the point that is touched",
+}
 
 
 def vendor_signals(simulation: Simulation) -> dict[str, NDArray[Any]]:
@@ -193,28 +198,22 @@ def write_parquet(path: Path, simulation: Simulation) -> None:
         if name != "target_current" or "current" in signals:
             label = "tau" if name == "torque" else name
             columns |= (per_axis if name == "wrench" else per_joint)(label, values)
-    write_columns(path, {name: values[rows] for name, values in columns.items()})
+    units = units_of(signals)
+    write_columns(path, {name: values[rows] for name, values in columns.items()}, units)
 
 
 def write_truth(path: Path, truth: Truth, start: float) -> None:
     """Write the truth of a log that begins at `start` [s]."""
     columns = truth.columns()
-    touched = {name.rpartition("/")[0] for name in columns if name.startswith("contact/")}
-    frames = {"wrench": StatedFrame(TRUTH_FRAME)} | dict.fromkeys(
-        touched, StatedFrame(AT_CONTACT)
-    )
-    write_columns(path, columns | {"t": columns["t"] + start}, frames)
+    write_columns(path, columns | {"t": columns["t"] + start}, TRUTH_COLUMNS)
 
 
-def write_columns(
-    path: Path, columns: dict[str, Array], frames: Mapping[str, StatedFrame] | None = None
-) -> None:
-    """Write named columns (M,) as a Parquet table, wrenches with frames."""
+def write_columns(path: Path, columns: dict[str, Array], units: Mapping[str, str]) -> None:
+    """Write named columns (M,) as a Parquet table that states their units."""
     import polars as pl
 
-    table = pl.DataFrame(columns)
-    schema = described_schema(table, frames)
-    table.write_parquet(path, compression="zstd", arrow_schema=schema)
+    about = {"vftcli": json.dumps({"columns": units})}
+    pl.DataFrame(columns).write_parquet(path, compression="zstd", metadata=about)
 
 
 #: Name at ``--as`` → the function that writes it.
