@@ -58,6 +58,8 @@ def test_the_digest_of_a_folder_is_that_of_its_files_in_name_order(tmp_path):
     assert sha256_of(tmp_path / "bag") == hashlib.sha256(b"123").hexdigest()
     path = table_csv(tmp_path / "x")
     assert read(path).source.sha256 == hashlib.sha256(path.read_bytes()).hexdigest()
+    path.write_text(path.read_text("utf-8").replace("\n", "\n\n", 1), "utf-8")
+    assert read(path).source.sha256 == hashlib.sha256(path.read_bytes()).hexdigest()
 
 
 @pytest.mark.parametrize("name", [n for n, layout in FORMATS.items() if not layout.folder])

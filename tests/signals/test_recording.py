@@ -35,24 +35,19 @@ def test_of_several_the_one_that_is_called_so_stays_alone() -> None:
         Recording(t=T, q=Q).with_effort("torque")
 
 
-def recording(sha256="", label="", rows=3, t0=0.0):
-    source = Source(sha256=sha256, label=label, rows=rows, t0=t0)
+def recording(sha256="", label="", t0=0.0):
+    source = Source(sha256=sha256, label=label, t0=t0)
     return Recording(t=np.arange(3.0), q=np.zeros((3, 6)), source=source)
 
 
 def test_recordings_are_one_run_by_digest_and_time_whatever_the_label():
-    """Those made in memory only if they are the same object; rows may tell without a digest."""
-
-    def awaited():
-        raise AssertionError("waited")
-
+    """Those made in memory only if they are the same object."""
     one = recording()
     assert same_run(recording("f00", "a.csv"), recording("f00", "b.csv"))
     assert not same_run(recording("f00", "a.csv"), recording("f01", "a.csv"))
     assert same_run(one, one)
     assert not same_run(one, recording())
     assert not same_run(recording("f00", t0=0.0), recording("f00", t0=90.0))
-    assert not same_run(recording(awaited, rows=3), recording(awaited, rows=4))
 
 
 def test_a_log_given_twice_is_refused_by_both_names():

@@ -1,6 +1,6 @@
 """Cleaning: every log's way to a Recording. Nothing is repaired silently."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -85,7 +85,7 @@ def cleaned(
     path: Path,
     format_name: str,
     choice: ReadChoice,
-    sha256: str | Callable[[], str] = "",
+    sha256: str = "",
     label: str = "",
 ) -> Recording:
     """Make a Recording of what a reader found.

@@ -8,7 +8,7 @@ import zlib
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import cached_property, lru_cache, partial
 from pathlib import Path
 from typing import Any, Literal
 
@@ -215,8 +215,15 @@ def files_of(path: Path) -> list[Path]:
 
 def sha256_of(*paths: Path) -> str:
     """SHA-256 of files, of a folder all in name order."""
+    files = [(file, file.stat()) for path in paths for file in files_of(path)]
+    return _digest(*((file, at.st_mtime_ns, at.st_size) for file, at in files))
+
+
+@lru_cache
+def _digest(*states: tuple[Path, int, int]) -> str:
+    """Digest of files with time and size, taken once for all episodes of a file."""
     total = hashlib.sha256()
-    for file in (file for path in paths for file in files_of(path)):
+    for file, *_ in states:
         with suppress(OSError), file.open("rb", buffering=0) as content:
             hashlib.file_digest(content, lambda: total)
     return total.hexdigest()

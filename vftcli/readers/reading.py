@@ -5,9 +5,8 @@ import re
 import shlex
 from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
-from functools import partial, wraps
+from functools import wraps
 from importlib import import_module
 from inspect import signature
 from pathlib import Path
@@ -174,9 +173,7 @@ def read_chosen(path: str | Path, choice: ReadChoice, label: str = "") -> Record
         raw = without_unknown_rows(raw) if choice.skips_unknown else raw
     if choice.arm is not None and not raw.part.endswith("arm"):
         raise LogError(f"{path}: a log of one arm; leave --arm out.")
-    sha256: Callable[[], str] = partial(sha256_of, *(raw.files or (path,)))
-    if not raw.part:  # of one of many parts it may never be asked for
-        sha256 = ThreadPoolExecutor(1).submit(sha256).result
+    sha256 = sha256_of(*(raw.files or (path,)))
     return cleaned(raw, path, reader.name, choice, sha256, label)
 
 

@@ -1,6 +1,6 @@
 """Recording: one log in SI units on one strictly increasing clock; its Source."""
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import field, replace
 from functools import cached_property
@@ -43,25 +43,6 @@ class Cut(NamedTuple):
     size: float
 
 
-class Awaited:
-    """A field that may be given as a function, called when it is first read."""
-
-    def __set_name__(self, _owner: type, name: str) -> None:
-        self._key = f"_{name}"
-
-    def __get__(self, instance: object, _owner: type) -> str:
-        if instance is None:
-            return ""  # the field's default
-        value: str | Callable[[], str] = instance.__dict__[self._key]
-        if not isinstance(value, str):
-            value = value()
-            instance.__dict__[self._key] = value
-        return value
-
-    def __set__(self, instance: object, value: str | Callable[[], str]) -> None:
-        instance.__dict__[self._key] = value
-
-
 @record
 class Source(Shown):
     """Where a recording came from and what was done to it on the way in."""
@@ -72,8 +53,7 @@ class Source(Shown):
     label: str = ""
     format: str = "memory"  #: The reader's name.
     columns: str = ""  #: What ``--columns`` said of it, "" for nothing.
-    #: Hex digest of the file, of a folder's in name order; reading it may wait.
-    sha256: Awaited = Awaited()
+    sha256: str = ""  #: Hex digest of the file, of a folder's in name order.
     clock: str = "as given"  #: Which clock the stamps are from, in words.
     t0: float = 0.0  #: The log's own stamp of the first sample. [s]
     #: The same stamp in whole nanoseconds where the log counts them. [ns]
@@ -337,7 +317,7 @@ def same_run(one: Recording, other: Recording) -> bool:
         return True
     mine, theirs = one.source, other.source
     if (mine.rows, mine.t0, mine.part) != (theirs.rows, theirs.t0, theirs.part):
-        return False  # without waiting for a digest
+        return False
     return bool(mine.sha256) and mine.sha256 == theirs.sha256
 
 
