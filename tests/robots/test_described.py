@@ -341,8 +341,8 @@ BOMB = (
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        (BOMB, "has a document type 'r', which defines XML entities"),
-        ('<!DOCTYPE r SYSTEM "file:///etc/passwd"><r/>', "has a document type 'r'"),
+        (BOMB, "has a document type, which defines XML entities"),
+        ('<!DOCTYPE r SYSTEM "file:///etc/passwd"><r/>', "has a document type"),
         ("<a>" * 100_000, "more than 500 elements within one another"),
         ("<a>" * 500 + "</a>" * 500, "its first element is <a>, not <robot> or <mujoco>"),
         ("", "which is XML: no element found"),

@@ -13,8 +13,8 @@ import subprocess
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from io import StringIO
 from pathlib import Path
-from typing import Any
 from xml.etree import ElementTree as ET
 
 import numpy as np
@@ -218,41 +218,20 @@ WAITED = 6  #: How many times as long it may take on busy processors.
 MEMORY = 1 << 30  #: Memory for it; large ones take a tenth. [B]
 
 
-class GuardedBuilder(ET.TreeBuilder):
-    """A tree builder that takes no document type and no deep nesting."""
-
-    def __init__(self, path: Path) -> None:
-        super().__init__()
-        self._path = path
-        self._depth = 0
-
-    def doctype(self, name: str, public: str | None, system: str | None) -> None:
-        """Refuse the document type, before what it defines is used."""
-        del public, system
+def xml_root(text: str, path: Path) -> ET.Element:
+    """The first element of an XML text without a document type and deep nesting."""
+    if "<!DOCTYPE" in text:
         raise RobotError(
-            f"{self._path}: has a document type {name!r}, which defines XML entities; "
+            f"{path}: has a document type, which defines XML entities; "
             "a robot description needs none: remove it"
         )
-
-    def start(self, tag: str, attrs: dict[Any, Any], /) -> ET.Element:
-        """Begin an element."""
-        self._depth += 1
-        if self._depth > DEEPEST:
-            raise RobotError(f"{self._path}: more than {DEEPEST} elements within one another")
-        return super().start(tag, attrs)
-
-    def end(self, tag: str, /) -> ET.Element:
-        """End an element."""
-        self._depth -= 1
-        return super().end(tag)
-
-
-def xml_root(text: str, path: Path) -> ET.Element:
-    """The first element of an XML text."""
-    parser = ET.XMLParser(target=GuardedBuilder(path))
+    depth = 0
     try:
-        parser.feed(text)
-        root = parser.close()
+        for event, element in ET.iterparse(StringIO(text), ("start", "end")):
+            root: ET.Element = element
+            depth += 1 if event == "start" else -1
+            if depth > DEEPEST:
+                raise RobotError(f"{path}: more than {DEEPEST} elements within one another")
     except (ET.ParseError, ValueError) as error:
         raise RobotError(f"{path}: not a URDF, xacro or MJCF, which is XML: {error}") from None
     return root
