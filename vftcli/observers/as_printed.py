@@ -10,12 +10,13 @@ KFO: u = μᵗ alone (40). The zero-order hold (44) has −A_c in its lower-righ
 
     [[Q_p Ts + (Q_τ − Q_p)Ts³/2, (Q_τ − Q_p)Ts²/2], [Q_τ Ts², Q_τ Ts]],
 
-and so does the covariance: all four entries are carried, and the gain is its left column.
+and so does the covariance: all four entries are carried, and the gain is its left column,
+settled at the nominal sample time.
 """
 
 import numpy as np
 
-from vftcli.observers.kalman_model import Densities, Discrete, Gains, KalmanState
+from vftcli.observers.kalman_model import Densities, Discrete, Gains
 from vftcli.signals.arrays import Array
 from vftcli.signals.external_torque import DynamicsTerms, one_sample_earlier
 from vftcli.signals.steady_filter import filtered
@@ -97,24 +98,3 @@ def printed_momentum(terms: DynamicsTerms, gain: Array, start: Array) -> tuple[A
     with np.errstate(over="ignore", invalid="ignore"):
         (tau,), end = filtered(F, g, terms.d, start, [np.array([[1.0], [0.0]])])
     return np.where(np.isfinite(tau), tau, np.nan), end
-
-
-def printed_hold_steps(
-    d: Array, model: Discrete, densities: Densities, state: KalmanState, *, begins: bool
-) -> tuple[Array, Array, KalmanState]:
-    """τ̂ and √P₂₂ with the noise of (44) as printed, sample by sample. (T, n) each
-
-    d (T, n) [N·m·s] is the input, `state` that before the block, or its prior.
-    """
-    tau, sd = np.zeros((2, *d.shape))
-    (error, torque), P = state
-    noise = np.moveaxis(printed_noise(model, densities), 2, 0)
-    for k, (a12, a22, r) in enumerate(zip(model.a12, model.a22, model.r, strict=True)):
-        if k or not begins:
-            P = predicted(P, a12, a22, noise[k])
-        (l1, l2), P = updated(P, r)
-        error = error + d[k] - a12 * torque
-        torque = a22 * torque + l2 * error
-        error = (1.0 - l1) * error
-        tau[k], sd[k] = torque, np.sqrt(P[1, 1])
-    return tau, sd, KalmanState(np.array([error, torque]), P)

@@ -20,10 +20,8 @@ import numpy as np
 
 from vftcli.observers.as_printed import (
     printed_dynamics_input,
-    printed_hold_steps,
     printed_momentum,
     printed_steady,
-    settled_prior,
 )
 from vftcli.observers.kalman_model import (
     NOISE_CONVENTIONS,
@@ -248,7 +246,8 @@ class KalmanObserver(BlockObserver):
     With diagonal R, Q_p and Q_τ it is n two-state filters with gains independent of data.
     The input is the trapezoid ½(μᵗ + μᵗ⁻¹). The first sample is x̂⁰ = [p⁰; 0] with the
     stationary prior: no transient of the gains at a constant sample time. On an uneven
-    clock each step has its own A, B, Q and R. The estimate's `sd` is the filter's √P₂₂.
+    clock each step has its own A, B, Q and R, but by (44) as printed. The estimate's `sd` is
+    the filter's √P₂₂.
 
     For A_τ = 0, A_c² = 0 and both discretisations share A and B; only Q differs.
 
@@ -293,17 +292,12 @@ class KalmanObserver(BlockObserver):
         n, step, begins = terms.joints, terms.clock.step, state is None
         d = self.unexplained(terms)
         zero, densities, settled = np.zeros((2, n)), self.densities(n), self.steady(step, n)
-        if terms.clock.uniform:
+        if terms.clock.uniform or self.prints_hold:
             F, g = error_filter(settled, self.model(step, n))
             start = zero if state is None else state.error
             tau, end = steady_filter(F, g, d, start, wanted=TORQUE)
             sd = np.broadcast_to(handed_over(np.sqrt(settled.p22)), tau.shape)
             state = KalmanState(end, np.stack(settled.posterior))
-        elif self.prints_hold:
-            every = self.model(terms.dt, n)
-            if state is None:
-                state = KalmanState(zero, settled_prior(self.model(step, n), densities))
-            tau, sd, state = printed_hold_steps(d, every, densities, state, begins=begins)
         else:
             if state is None:
                 prior, first = self.first_prior(step, n), self.model(terms.dt[:1], n).r[0]
