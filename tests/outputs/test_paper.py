@@ -193,6 +193,8 @@ def test_of_seven_joints_the_last_of_each_column_has_the_time() -> None:
     *plots, empty = drawn_lines(3.5, paper.plots_of(made)).axes
     assert [axes.get_xlabel() for axes in plots] == [""] * 5 + ["Time (s)"] * 2
     assert not empty.axison
+    bottoms = [plots[k].get_position().y0 for k in (0, 2, 4, 6)]  # rows stay as close
+    np.testing.assert_allclose(np.diff(bottoms), np.diff(bottoms).mean(), atol=0.01)
 
 
 LARGE, SMALL = np.array([5.0, 2.0]), np.array([0.4, np.nan])

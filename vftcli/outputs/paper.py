@@ -187,6 +187,8 @@ def line_figure(
         axes.set_ylabel(f"{plot.chart.panels[plot.panel]} ({plot.chart.units[plot.panel]})")
         if k + columns >= len(plots):
             axes.set_xlabel("Time (s)")
+            # In an empty place below it is room.
+            axes.xaxis.set_in_layout(k + columns >= len(grid))
         else:
             axes.tick_params(labelbottom=False)
         (start, stop), end = axes.get_xlim(), -np.inf
