@@ -4,19 +4,17 @@ from dataclasses import replace
 
 import numpy as np
 
-from vftcli.outputs.figures import log_figures
 from vftcli.outputs.page.log_charts import torque_chart
 from vftcli.outputs.page.pages import render
 from vftcli.outputs.rerun_recording import plot_groups
 
 
-def test_ribbons_curve_and_spectra_are_charts(worked_up):
+def test_bands_are_ribbons_and_curves_are_kept(worked_up):
     halves = {s.name: s.half for s in torque_chart(worked_up).series if s.half is not None}
     assert set(halves) == {e.name for e in worked_up.estimates}
     band = worked_up.estimates[-1].error_sd
     np.testing.assert_array_equal(halves["rts-auto"], 1.96 * band)
     assert list(worked_up.refinement.curves) == ["kfo-auto", "rts-auto"]
-    assert {"spectra", "tuning"} <= log_figures(worked_up).keys()
     assert "Error budget in N·m rms" in render(replace(worked_up, run={}))
 
 
