@@ -19,6 +19,7 @@ from vftcli.robots.robot import Limits, SensorNoise
 from vftcli.robots.run import Run
 from vftcli.signals.filters import zero_phase
 from vftcli.signals.recording import Recording
+from vftcli.signals.rest import faster
 
 STEP = 0.01
 
@@ -89,6 +90,7 @@ def fit_rows(run, stride, cutoff=None):
         columns=error_columns(run, motion, expected_error(run.robot), stride),
         loads=slow_loads(run.robot.chain, motion.t[::stride], motion.q[::stride]),
         d=(d if cutoff is None else zero_phase(motion.t, d, cutoff))[::stride],
+        moves=np.any(faster(motion.dq[::stride]), axis=1),
     )
 
 

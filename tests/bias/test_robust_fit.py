@@ -70,6 +70,27 @@ def test_a_scale_is_never_below_a_share_of_the_dry_friction():
     assert fit.free.all()
 
 
+def test_a_long_rest_does_not_make_all_motion_a_contact():
+    """Two thirds of the time at rest: their residual of 1 mN·m is no scale of a motion's."""
+    rows, chain = rows_of(None, size=3.0), shortened(ur10e(), 3).chain
+    rest, samples = 2 * len(rows.d), 3 * len(rows.d)
+
+    def after_rest(x):
+        return np.concatenate([np.repeat(x[:1], rest, axis=0), x])
+
+    loads = slow_loads(chain, STEPS * STEP * np.arange(samples), np.zeros((samples, 3)))
+    rows = replace(
+        rows,
+        columns=[after_rest(column) for column in rows.columns],
+        loads=loads._replace(torque=after_rest(rows.loads.torque)),
+        d=np.concatenate([1e-3 * np.ones((rest, 3)), rows.d]),
+        moves=np.arange(samples) >= rest,
+    )
+    assert fit_robustly(rows, STEPS * STEP, DRY).free[rest:].mean() > 0.4
+    as_motion = replace(rows, moves=np.ones_like(rows.moves))
+    assert fit_robustly(as_motion, STEPS * STEP, DRY).free[rest:].mean() < 0.1
+
+
 def test_weights_count_what_is_correlated_once(pushed):
     """.3 s of samples count as one: ten at a step of 30 ms."""
     fit = fit_robustly(pushed, STEPS * STEP, DRY)

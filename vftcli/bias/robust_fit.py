@@ -109,6 +109,7 @@ class Rows:
     columns: Sequence[Array]
     loads: SlowLoads  #: The columns of slow loads.
     d: Array  #: The fitted torque. (S, n) [N·m]
+    moves: Mask  #: Samples in motion: at rest no error shows. (S,)
 
     @property
     def joints(self) -> int:
@@ -240,7 +241,8 @@ def fit_robustly(rows: Rows, step: float, dry: Array) -> WholeLogFit:
         free = free_samples(np.max(abs(residual) / scale, axis=1), step)
         weight = huber(residual / scale) / (counted * scale**2)
         residual = rows.residual(rows.solution(rows.sums(weight, free)[0]))
-        scale = np.maximum(robust_sd(residual[free]), least)
+        used = free & rows.moves
+        scale = np.maximum(robust_sd(residual[used if used.any() else free]), least)
     return WholeLogFit(rows=rows, step=step, free=free, scale=scale, weight=weight)
 
 
@@ -248,7 +250,8 @@ def first_fit(rows: Rows, step: float, counted: float, least: Array) -> tuple[Ar
     """Residual (S, n) without loads, and its scale, at `least` (n,). [N·m]"""
     held = SlowLoads(rows.loads.torque[:, :, :0], 0 * rows.loads.knot, rows.loads.share, 1)
     rows, residual = replace(rows, loads=held), rows.d
-    quiet = np.quantile(abs(residual), QUIET_SHARE, axis=0)
+    moves = rows.moves if np.count_nonzero(rows.moves) >= FEWEST else slice(None)
+    quiet = np.quantile(abs(residual[moves]), QUIET_SHARE, axis=0)
     scale = np.maximum(SD_PER_MEDIAN * quiet / QUIET_QUANTILE, least)
     threshold, reach = np.inf, round(REACH / step)
     for _ in range(PASSES):
@@ -256,13 +259,13 @@ def first_fit(rows: Rows, step: float, counted: float, least: Array) -> tuple[Ar
         padded = np.pad(np.max(abs(residual) / scale, axis=1), reach, mode="edge")
         worst = sliding_window_view(padded, 2 * reach + 1).max(axis=1)
         first = np.isinf(threshold)
-        threshold = np.quantile(worst, FIRST) if first else threshold / NARROWED
+        threshold = np.quantile(worst[moves], FIRST) if first else threshold / NARROWED
         threshold = max(threshold, NARROWEST)
         share = (1.0 + (worst / threshold) ** 2) ** -2
         residual = rows.residual(
             rows.solution(rows.sums(share[:, None] / (counted * scale**2))[0])
         )
-        trusted = residual[share > TRUSTED]
+        trusted = residual[moves][share[moves] > TRUSTED]
         if len(trusted):
             scale = np.maximum(robust_sd(trusted), least)
     return residual, scale

@@ -123,7 +123,8 @@ def whole_log_bias(run: Run) -> WholeLogBias:
             d = zero_phase(t, derivative(t, coarse.terms.p) - coarse.terms.mu, CUTOFF)
             loads = slow_loads(run.robot.loaded_chain, t[::stride], motion.q[::stride])
             columns = error_columns(coarse, motion, expected, stride)
-            rows = Rows(columns=columns, loads=loads, d=d[::stride])
+            moves = np.any(faster(motion.dq[::stride]), axis=1)
+            rows = Rows(columns=columns, loads=loads, d=d[::stride], moves=moves)
             fit = fit_robustly(rows, stride * median_step(t), usual_friction(run.robot)[0])
             tried = guarded(fit, motion.dq[::stride])
             if span < LEAST_MOTION:
