@@ -109,7 +109,7 @@ class Rows:
     columns: Sequence[Array]
     loads: SlowLoads  #: The columns of slow loads.
     d: Array  #: The fitted torque. (S, n) [N·m]
-    moves: Mask  #: Samples in motion: at rest no error shows. (S,)
+    moves: Mask  #: Samples in motion; at rest no error shows. (S,)
 
     @property
     def joints(self) -> int:

@@ -223,7 +223,7 @@ def zero_bursts(torque: Array, least: Array) -> Mask:
 
 
 def stuck_samples(recording: Recording, name: str) -> Mask:
-    """Samples in which a joint's signal wrongly repeats itself. (T, n)"""
+    """Samples in which a signal wrongly repeats. (T, n)"""
     found = np.zeros(recording.q.shape, bool)
     for j, first, last in stuck_stretches(recording, name):
         found[first + 1 : last + 1, j] = True

@@ -161,8 +161,8 @@ class NamedColumns:
         if others:
             first = self.table.names[cells[0].column]
             raise LogError(
-                f"{self.table.path}: columns like {first!r} have several units. Name them with "
-                "--columns."
+                f"{self.table.path}: columns like {first!r} have several units. "
+                "Name them with --columns."
             )
         return unit
 
@@ -254,7 +254,7 @@ def picks_by_alias(
 
 
 def without_unit(name: str) -> tuple[str, str | None]:
-    """A column's name without the unit behind it, and the unit or None."""
+    """A column's name, and the unit behind it or None."""
     match = UNIT.fullmatch(name)
     known = match and any(match[2] in units for units in UNITS.values())
     return (match[1], match[2]) if match and known else (name, None)
