@@ -1,4 +1,4 @@
-"""``vftcli`` in a shell and ``python -m vftcli``: an interrupt is no traceback while it loads."""
+"""``vftcli`` and ``python -m vftcli``: an interrupt is no traceback while it loads."""
 
 import signal
 from importlib import import_module

@@ -187,7 +187,7 @@ def line_figure(
         axes.set_ylabel(f"{plot.chart.panels[plot.panel]} ({plot.chart.units[plot.panel]})")
         if k + columns >= len(plots):
             axes.set_xlabel("Time (s)")
-            # In an empty place below it is room.
+            # An empty place below has room.
             axes.xaxis.set_in_layout(k + columns >= len(grid))
         else:
             axes.tick_params(labelbottom=False)

@@ -156,7 +156,7 @@ class NamedColumns:
         return None
 
     def unit(self, cells: Cells) -> str | None:
-        """The unit in the names of some columns, if any."""
+        """The unit in the names of columns, if any."""
         unit, *others = {without_unit(self.table.names[cell.column])[1] for cell in cells}
         if others:
             first = self.table.names[cells[0].column]
