@@ -39,7 +39,6 @@ name = "elbow"
 kind = "profile"
 spans = [[0.6, 1.8]]
 force = [0.0, 9.0, 4.0]
-axes = "link"
 link = 4
 point = [0.05, 0.0, 0.02]
 [sensing]

@@ -1,7 +1,5 @@
 """Commanded motions: geometry, derivatives, limits, and how well they excite."""
 
-from dataclasses import replace
-
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -17,9 +15,7 @@ from vftcli.simulation.trajectories import (
     ExcitationSpec,
     HoldSpec,
     JointMovesSpec,
-    JointwiseSpec,
     OffsetsSpec,
-    PosesSpec,
     check_start,
     plan,
 )
@@ -29,8 +25,6 @@ SPECS = [
     HoldSpec(),
     OffsetsSpec(moves=((0.5, 1.5, 0.1, 0.0, 0.05), (2.0, 3.0, 0.0, 0.0, 0.0)), length=3.5),
     JointMovesSpec(moves=((0.2, 1.5, 0.1, 0, 0.3, 0, 0, 0.2),), length=2.0),
-    PosesSpec(count=3),
-    JointwiseSpec(speeds=(0.4,)),
     load_scenario("free-excitation").trajectory,
 ]
 
@@ -69,21 +63,6 @@ def test_derivatives_are_those_of_the_positions(spec: object) -> None:
     np.testing.assert_allclose((after.dq - before.dq) / (2 * h), here.ddq, atol=2e-6)
 
 
-def test_sweeps_go_out_across_and_back_one_joint_at_a_time() -> None:
-    """.4 rad at .4 rad/s: 1 s out, 2 s across, 1 s back, .3 s of rest, joint after joint."""
-    robot = load_robot("ur5")
-    motion = JointwiseSpec(speeds=(0.4,)).motion(robot)
-    assert motion.duration == pytest.approx(0.3 + 6 * 4.3)
-    quick = JointwiseSpec(speeds=(10.0, 20.0), rest=0.1).motion(robot)  # .2 s a part at least
-    assert quick.duration == pytest.approx(0.1 + 6 * 2 * (3 * 0.2 + 0.1))
-    start = motion.at(np.array([0.0])).q
-    for j in range(6):
-        t = 0.3 + 4.3 * j + np.array([-0.1, 1.0, 2.0, 3.0, 4.1])
-        away = np.zeros((5, 6))
-        away[:, j] = [0.0, 0.4, 0.0, -0.4, 0.0]
-        np.testing.assert_allclose(motion.at(t).q - start, away, atol=1e-9)
-
-
 def test_circle_is_a_horizontal_circle_of_fixed_orientation() -> None:
     robot = load_robot("ur5")
     spec = CircleSpec(towards=-1.5)
@@ -120,32 +99,6 @@ def test_moves_lead_straight_to_where_they_say() -> None:
         np.testing.assert_allclose(pose.rotation, home.rotation, atol=1e-9)
     q = joints.motion(robot).at(0.2 + 1.3 * (t - 0.5)).q  # type: ignore[attr-defined]
     np.testing.assert_allclose(q - q[0], np.outer(way, [0.1, 0, 0.3, 0, 0, 0.2]), atol=1e-12)
-
-
-@pytest.mark.parametrize("unknown", [False, True])
-def test_drawn_poses_are_held_inside_the_limits_above_the_table(unknown: bool) -> None:
-    robot = load_robot("panda")
-    low, high = robot.limits.q_min + 0.05, robot.limits.q_max - 0.05
-    if unknown:
-        nothing = np.full(7, np.nan)
-        robot = replace(robot, limits=replace(robot.limits, q_min=nothing, q_max=nothing))
-        low, high = np.full((2, 7), [[-np.pi], [np.pi]])
-    spec = PosesSpec(count=80, spread=2.0, move=1.5, dwell=0.5)
-    motion = spec.motion(robot)
-    assert motion.duration == 80 * 0.5 + 79 * 1.5
-    begin, middle, end = (motion.at(2.0 * np.arange(80) + dt).q for dt in (0.0, 0.2, 0.5))
-    np.testing.assert_allclose([begin, end], [middle, middle], atol=1e-12)
-    home = check_start(robot, ())
-    assert np.all((middle >= low - 1e-12) & (middle <= high + 1e-12))
-    # 80 draws of 2 rad to both sides: each joint has gone to nine tenths, or to its limit
-    reached = np.array([np.maximum(low, home - 1.8), np.minimum(high, home + 1.8)])
-    assert np.all(middle.min(axis=0) <= reached[0])
-    assert np.all(middle.max(axis=0) >= reached[1])
-    assert 0.15 < min(pose.translation[2] for pose in map(FlangeSolver(robot).pose, middle)) < 0.2
-    # the first of NumPy's draws lies above the table
-    first = PosesSpec(count=2, move=0.5, dwell=0.0).motion(robot).at(np.zeros(1)).q[0]
-    drawn = home + np.random.default_rng(1).uniform(-0.7, 0.7, 7)
-    np.testing.assert_allclose(first, np.clip(drawn, low, high), atol=1e-12)
 
 
 def regressor(robot, motion):
@@ -214,11 +167,6 @@ def moves(*times: tuple[float, float]) -> JointMovesSpec:
         (moves((1.0, 2.1)), "times that increase"),
         (moves((0.0, 1.0), (0.9, 2.0)), "times that increase"),
         (moves((1.0, 1.0)), "times that increase"),
-        (PosesSpec(move=0.0), "count at least 2"),
-        (PosesSpec(dwell=-0.1), "dwell not negative"),
-        (PosesSpec(count=1), "count at least 2"),
-        (JointwiseSpec(speeds=()), "speeds must be positive"),
-        (JointwiseSpec(speeds=(0.1, 0.0)), "speeds must be positive"),
         (ExcitationSpec(mean=ROW, cosine=(ROW,), sine=(SHORT,)), "must have 6 numbers"),
         (ExcitationSpec(mean=SHORT, cosine=(ROW,), sine=(ROW,)), "must have 6 numbers"),
         (ExcitationSpec(mean=ROW, cosine=(ROW, ROW), sine=(ROW,)), "as many rows"),

@@ -14,7 +14,6 @@ from vftcli.simulation.contacts import Place, SimulatedContact, Touching, drawn,
 from vftcli.simulation.scenario import (
     ContactSpec,
     HandSpec,
-    LoadSpec,
     ProfileSpec,
     PushesSpec,
     StopSpec,
@@ -116,11 +115,6 @@ def test_hand_twists_about_its_turn() -> None:
     np.testing.assert_allclose(wrench(hand, 0.5, turning)[3:], [0, 0, 2.0], atol=1e-12)
 
 
-def test_load_pulls_straight_down() -> None:
-    load = started(LoadSpec(name="l", weight=0.5, spans=((0.0, 4.0),)), rng(), 4.0)
-    np.testing.assert_allclose(wrench(load, 2.0), [0, 0, -0.5, 0, 0, 0])
-
-
 def test_stop_pushes_and_never_pulls() -> None:
     stop = StopSpec(name="s", through=(0, 0, 0.31), stiffness=1000.0, damping=100.0)
     wall = started(stop, rng(), 1.0)
@@ -141,10 +135,8 @@ def test_stop_pushes_and_never_pulls() -> None:
         (PushesSpec(name="h", style="tapps"), "Did you mean taps"),
         (PushesSpec(name="h", length=(0.0, 1.0)), "must be positive"),
         (PushesSpec(name="h", pause=(0.0, 1.0)), "must be positive"),
-        (LoadSpec(name="l", weight=-1.0, spans=()), "negative"),
         (StopSpec(name="s", through=(0, 0, 0), normal=(0, 0, 0)), "no length"),
         (HandSpec(name="h", spans=((0, 1),), moves=((0, 0, 0), (0, 0, 0))), "one for each"),
-        (ProfileSpec(name="p", spans=(), axes="tool"), "there is base, link"),
     ],
 )
 def test_impossible_contacts_are_refused(spec: ContactSpec, words: str) -> None:
@@ -184,13 +176,3 @@ def test_a_hand_brakes_how_its_point_moves_and_its_link_turns(link: int) -> None
     expected = [*(-2.0 * (ahead - behind) / (2 * h)), *(-3.0 * spin)]
     np.testing.assert_allclose(wrench_on_arm(hand, v), expected, atol=1e-7)
     assert np.linalg.norm(expected[:3]) > 0.1
-
-
-@pytest.mark.parametrize("link", [0, 4])
-def test_link_axes_turn_with_the_link(link: int) -> None:
-    force, torque = (3.0, -4.0, 12.0), (0.5, 0.2, -0.3)
-    spec = ProfileSpec(name="p", spans=((0.0, 10.0),), force=force, torque=torque,
-                       link=link, point=POINT, axes="link")  # fmt: skip
-    rotation = point_of(Q, link)[1]
-    expected = [*(rotation @ force), *(rotation @ torque)]
-    np.testing.assert_allclose(wrench_on_arm(spec, np.zeros(7)), expected, atol=1e-12)

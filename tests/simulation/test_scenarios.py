@@ -130,15 +130,12 @@ MismatchSpec = {}
 PayloadSpec = {}
 ForceSensorSpec = {position = [0, 0, 0.03], com = [0, 0, 0.02], tool_com = [0, 0, 0.03]}
 SensingSpec = {torque = "average", noise = 1, position_step = 5e-6, vendor_cutoff = 5, start = 100}
-ProfileSpec = {rise = 0.2, fall = 0.2, axes = "base"}
-LoadSpec = {rise = 0.5, fall = 0.3}
+ProfileSpec = {rise = 0.2, fall = 0.2}
 PushesSpec = {style = "slow", vertical = 0.5}
 HandSpec = {reach = 0.6, release = 0.08, stiffness = 200, damping = 15}
 StopSpec = {normal = [0, 0, 1], stiffness = 2e4, damping = 200}
 CircleSpec = {radius = 0.2, period = 4, cycles = 5}
 HoldSpec = {length = 10}
-PosesSpec = {move = 2.5, dwell = 2, count = 12, spread = 0.7}
-JointwiseSpec = {amplitude = 0.4, speeds = [0.1, 0.2, 0.4, 0.7], rest = 0.3}
 ExcitationSpec = {period = 10, cycles = 2}
 """
 
@@ -158,14 +155,14 @@ def test_what_a_file_leaves_out_is_off_but_for_these(
 
 
 def test_unknown_scenario_lists_them(tmp_path: Path) -> None:
-    usual = "free-excitation.*jointwise.*panda-bearing.*payload-pair.*static-poses.*ur5-circle"
+    usual = "free-excitation.*panda-bearing.*payload-pair.*static-poses.*ur5-circle"
     with pytest.raises(ParameterError, match=rf"{usual}.*Did you mean ur5-circle\?"):
         load_scenario("ur5-cirle")
     with pytest.raises(ParameterError, match="cannot be read"):
         load_scenario(tmp_path / "none.toml")
 
 
-LOAD = "[[contacts]]\nname='a'\nkind='load'\nweight=1.0\nspans=[[0.0,1.0]]\n"
+LOAD = "[[contacts]]\nname='a'\nkind='profile'\nspans=[[0.0,1.0]]\n"
 
 
 @pytest.mark.parametrize(
@@ -173,7 +170,7 @@ LOAD = "[[contacts]]\nname='a'\nkind='load'\nweight=1.0\nspans=[[0.0,1.0]]\n"
     [
         ("name = 'x'\n[servo]\nstiffness = ", "not valid TOML"),
         ("[trajectory]\nradius = 0.2\n", "trajectory.kind ''"),
-        ("[[contacts]]\nkind = 'load'\nname = 'l'\n", "contacts.0..weight is missing"),
+        ("[[contacts]]\nkind = 'profile'\nname = 'l'\n", "contacts.0..spans is missing"),
         (f"duration = 0.1\n{LOAD}{LOAD}", "two contacts are named 'a'"),
     ],
 )

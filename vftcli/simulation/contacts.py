@@ -14,7 +14,7 @@ from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.parsing import check_known
 from vftcli.signals.pose import cross
-from vftcli.simulation.scenario import ContactSpec, HandSpec, LoadSpec, PushesSpec, StopSpec
+from vftcli.simulation.scenario import ContactSpec, HandSpec, PushesSpec, StopSpec
 from vftcli.simulation.trajectories import minimum_jerk
 
 
@@ -145,16 +145,10 @@ def stop_of(spec: StopSpec) -> SimulatedContact:
     return SimulatedContact([(-math.inf, math.inf)], wrench)
 
 
-def pushes_of(pushes: Sequence[Push], *, in_link: bool = False) -> SimulatedContact:
-    """Pushes that follow one another, in base axes or in the link's."""
-
-    def wrench(k: int, t: float, place: Place) -> Array:
-        size = pushes[k].at(t)
-        if not in_link:
-            return size
-        return np.concatenate([place.rotation @ part for part in np.split(size, 2)])
-
-    return SimulatedContact([(push.start, push.stop) for push in pushes], wrench)
+def pushes_of(pushes: Sequence[Push]) -> SimulatedContact:
+    """Pushes that follow one another, in base axes."""
+    spans = [(push.start, push.stop) for push in pushes]
+    return SimulatedContact(spans, lambda k, t, _place: pushes[k].at(t))
 
 
 def started(spec: ContactSpec, rng: np.random.Generator, duration: float) -> SimulatedContact:
@@ -165,16 +159,9 @@ def started(spec: ContactSpec, rng: np.random.Generator, duration: float) -> Sim
         return stop_of(spec)
     if isinstance(spec, HandSpec):
         return hand_of(spec)
-    if isinstance(spec, LoadSpec):
-        if spec.weight < 0:
-            raise ParameterError(f"contacts.{spec.name}.weight is negative")
-        wrench, axes = np.array([0.0, 0.0, -spec.weight, 0.0, 0.0, 0.0]), "base"
-    else:
-        wrench, axes = np.concatenate([spec.force, spec.torque]), spec.axes
-        check_known(axes, ("base", "link"), f"no axes {axes!r}")
+    wrench = np.concatenate([spec.force, spec.torque])
     spans = sorted(spec.spans, key=lambda span: span[0])
-    pushes = [Push(a, b, spec.rise, spec.fall, wrench) for a, b in spans]
-    return pushes_of(pushes, in_link=axes == "link")
+    return pushes_of([Push(a, b, spec.rise, spec.fall, wrench) for a, b in spans])
 
 
 class Mounted(NamedTuple):

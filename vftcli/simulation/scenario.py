@@ -145,23 +145,13 @@ class OnLink(Spec):
 
 
 class ProfileSpec(OnLink, kind="profile"):
-    """A stated wrench, switched on and off smoothly at stated times."""
+    """A stated wrench in base axes, switched on and off smoothly at stated times."""
 
     spans: tuple[tuple[float, float], ...]  #: Start and end of each application. (K, 2) [s]
     force: Vector = ORIGIN  #: Force ON the robot. (3,) [N]
     torque: Vector = ORIGIN  #: Moment ON the robot about the point. (3,) [N·m]
     rise: float = 0.2  #: Time to the full wrench. [s]
     fall: float = 0.2  #: Time of the release. [s]
-    axes: str = "base"  #: "base" or "link": what the components refer to.
-
-
-class LoadSpec(OnLink, kind="load"):
-    """A load on a string: its weight pulls straight down at the point."""
-
-    weight: float  #: Weight. [N]
-    spans: tuple[tuple[float, float], ...]  #: When it hangs. (K, 2) [s]
-    rise: float = 0.5  #: Time in which the string takes the load. [s]
-    fall: float = 0.3  #: Time in which it comes off. [s]
 
 
 class PushesSpec(OnLink, kind="pushes"):
@@ -204,7 +194,7 @@ class StopSpec(OnLink, kind="stop"):
 
 
 #: Every kind of ``[[contacts]]`` a scenario can have.
-ContactSpec = ProfileSpec | PushesSpec | HandSpec | LoadSpec | StopSpec
+ContactSpec = ProfileSpec | PushesSpec | HandSpec | StopSpec
 
 
 class Scenario(Spec):

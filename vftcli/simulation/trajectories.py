@@ -2,19 +2,17 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise, product
+from itertools import pairwise
 from typing import ClassVar, NamedTuple, TypeVar, dataclass_transform
 
 import numpy as np
 
-from vftcli.robots.chain import link_poses
 from vftcli.robots.robot import FlangeSolver, Robot
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ParameterError
 
 #: Harmonics kept of a periodic path; those of a circle fall below rounding long before.
 HARMONICS = 48
-TABLE = 0.15  #: Least height of the flange in poses that are drawn. [m]
 #: A pose counts as reached when position and rotation error are below this. [m, rad]
 REACHED = 1e-10
 #: Joints → a pose for work, the flange looking down. [rad]
@@ -206,60 +204,6 @@ class JointMovesSpec(Spec, kind="joint-moves"):
         return Stretches(times, straight_paths(points), self.length)
 
 
-class PosesSpec(Spec, kind="poses"):
-    """Drawn joint poses, approached one after the other and held."""
-
-    move: float = 2.5  #: Time of each move. [s]
-    dwell: float = 2.0  #: Rest at each pose. [s]
-    count: int = 12  #: How many poses are drawn.
-    spread: float = 0.7  #: How far they lie from the usual pose, evenly to both sides. [rad]
-
-    def motion(self, robot: Robot) -> Command:
-        """Straight moves between poses inside the limits with the flange above the table."""
-        if self.move <= 0 or self.dwell < 0 or self.count < 2:
-            raise ParameterError(
-                "trajectory.move must be positive, dwell not negative, and count at least 2"
-            )
-        rng, home = np.random.default_rng(1), check_start(robot, ())
-        low = np.nan_to_num(robot.limits.q_min + 0.05, nan=-np.pi)
-        high = np.nan_to_num(robot.limits.q_max - 0.05, nan=np.pi)
-        size = 100 * self.count, robot.joints
-        poses = np.clip(home + rng.uniform(-self.spread, self.spread, size), low, high)
-        height = link_poses(robot.chain, poses).translation[:, -1, 2]
-        points = list(poses[height > TABLE][: self.count])
-        if len(points) < self.count:
-            raise ParameterError(
-                f"trajectory.spread {self.spread:g} leaves robot {robot.name!r} no {self.count} "
-                "poses above the table; make it smaller"
-            )
-        starts = self.dwell + np.arange(self.count - 1) * (self.move + self.dwell)
-        times = np.column_stack([starts, starts + self.move])
-        return Stretches(times, straight_paths(points), times[-1, 1] + self.dwell)
-
-
-class JointwiseSpec(Spec, kind="jointwise"):
-    """One joint at a time swept back and forth at several speeds."""
-
-    amplitude: float = 0.4  #: Sweep to each side. [rad]
-    speeds: tuple[float, ...] = (0.1, 0.2, 0.4, 0.7)  #: Mean speeds of the sweeps. [rad/s]
-    rest: float = 0.3  #: Rest between sweeps. [s]
-
-    def motion(self, robot: Robot) -> Command:
-        """Each sweep as minimum-jerk moves from the usual pose out, across and back."""
-        start = check_start(robot, ())
-        if min(self.speeds, default=0.0) <= 0:
-            raise ParameterError("trajectory.speeds must be positive")
-        t, times, paths = self.rest, [], []
-        for axis, speed in product(self.amplitude * np.eye(robot.joints), self.speeds):
-            for a, b in pairwise((0 * axis, axis, -axis, 0 * axis)):
-                length = max(abs(b - a).sum() / speed, 0.2)
-                times.append((t, t + length))
-                paths.append(np.vstack([start + 0.5 * (a + b), 0.5 * (b - a)]))
-                t += length
-            t += self.rest
-        return Stretches(np.array(times), tuple(paths), t)
-
-
 class ExcitationSpec(Spec, kind="excitation"):
     """A Fourier series of the joints."""
 
@@ -283,8 +227,7 @@ class ExcitationSpec(Spec, kind="excitation"):
         return Periodic(self.period, self.cycles, *series)
 
 
-StatedSpec = CircleSpec | HoldSpec | OffsetsSpec | JointMovesSpec
-TrajectorySpec = StatedSpec | PosesSpec | JointwiseSpec | ExcitationSpec
+TrajectorySpec = CircleSpec | HoldSpec | OffsetsSpec | JointMovesSpec | ExcitationSpec
 
 
 def check_times(times: Array, length: float) -> None:
