@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from vftcli.doctor.examination import Examination
     from vftcli.evaluation import ReferenceChoice
     from vftcli.wrench import WrenchChoice
-    from vftcli.wrench.detection import KnownContacts
+    from vftcli.wrench.detection import ContactInterval
 
 WRITING = 0.7  # share of a log's work before its files are written
 
@@ -372,24 +372,13 @@ def sense(analysis: Analysis, choice: AnalysisChoice, *, unasked: bool = True) -
     return replace(analysis, virtual_sensor=found)
 
 
-def known_contacts(analysis: Analysis, choice: AnalysisChoice) -> "KnownContacts":
-    """Known contacts of the log: its list, and its free samples."""
-    from vftcli.contacts.free_statistics import free_part
-    from vftcli.wrench.detection import ContactInterval, KnownContacts, read_in_free_runs
+def listed_contacts(analysis: Analysis) -> "list[ContactInterval] | None":
+    """When the listed contacts are, None without a list."""
+    from vftcli.wrench.detection import ContactInterval
 
-    motion, rows = unloaded_motion(analysis.motion, choice), analysis.contacts
-    part = free_part(motion)
-    listed = (
-        {} if rows is None else {BEST: [ContactInterval(c.start, c.stop) for c in rows.contacts]}
-    )
-    if part is None:
-        return KnownContacts(untouched=np.zeros(len(motion.log.t), bool), listed=listed)
-    others = [] if part.own.any() else [p for p in part.pieces if p.run is not motion.log]
-    own = [o for o in analysis.observers if o.name not in listed]
-    sensed = analysis.virtual_sensor if choice.wrench is not None else None
-    sensor = None if sensed is None else sensed.sensor
-    beside = read_in_free_runs(others, own, analysis.run_of, sensor)
-    return KnownContacts(untouched=part.own, beside=beside, listed=listed)
+    if analysis.contacts is None:
+        return None
+    return [ContactInterval(c.start, c.stop) for c in analysis.contacts.contacts]
 
 
 def judge(analysis: Analysis, choice: AnalysisChoice) -> Analysis:
@@ -399,9 +388,9 @@ def judge(analysis: Analysis, choice: AnalysisChoice) -> Analysis:
     from vftcli.evaluation import references
 
     sensed = analysis.virtual_sensor if choice.wrench is not None else None
-    known = known_contacts(analysis, choice) if choice.reference.contacts else None
+    listed = listed_contacts(analysis) if choice.reference.contacts else None
     reference, errors, sensed = references.judge(
-        analysis.motion, analysis.estimates, sensed, choice.reference, known
+        analysis.motion, analysis.estimates, sensed, choice.reference, listed
     )
     if choice.reference.name == "zero" and (found := touches(analysis.motion.log, choice)):
         reference = replace(reference, remarks=(*reference.remarks, *found.not_free(analysis.t)))

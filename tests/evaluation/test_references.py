@@ -27,7 +27,7 @@ from vftcli.signals.errors import ReferenceTorqueError
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.recording import Recording, Source
 from vftcli.signals.wrench import AXES, Wrench
-from vftcli.wrench.detection import ContactScore, Detection
+from vftcli.wrench.detection import Detection
 from vftcli.wrench.sensor import SensorReading
 from vftcli.wrench.solvers import VirtualSensor
 
@@ -134,7 +134,7 @@ def test_a_lag_behind_the_sensor_is_said_where_the_sensor_is_the_reference(tmp_p
     sensor, choice = VirtualSensor(frame="base"), ReferenceChoice(name="sensor")
     same = reference_wrench(recording, ROBOT, make_reference(motion, choice), sensor)
     wrenches = (replace(same, name="gmo"),)
-    read = SensorReading(sensor=sensor, wrenches=wrenches, masked=never, free=never)
+    read = SensorReading(sensor=sensor, wrenches=wrenches, masked=never)
     found = judge(motion, [estimate], read, choice)[2]
     (lag,) = (remark for remark in found.remarks if remark.code == "lag-behind-sensor")
     assert lag.values["lag_ms"] == pytest.approx(0.0, abs=5.0)  # half a sample
@@ -204,9 +204,8 @@ def test_contacts_stand_below_the_errors() -> None:
         contacts=3, listed=5, missed=1, false_alarms=2, false_alarms_per_h=7.5,
         delay=(0.1, 0.3, np.nan),
     )  # fmt: skip
-    score = ContactScore(name="gmo", signal="torque", detection=detection)
     errors = pl.DataFrame({"recording": ["log"], "observer": ["gmo"]})
-    row = with_contacts(errors, "log", "truth", [score]).row(1, named=True)
+    row = with_contacts(errors, "log", "truth", detection).row(1, named=True)
     names = ("contacts", "listed_contacts", "found_contacts", "missed_contacts", "false_alarms")
     assert [row[name] for name in names] == [3, 5, 2, 1, 2]
     assert row["false_alarms_per_h"] == 7.5

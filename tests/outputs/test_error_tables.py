@@ -220,13 +220,13 @@ def test_the_paper_s_bounds_stand_below_its_own_arm_only(wrench_errors, without_
 def test_contacts_are_counted_in_whole_numbers(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("COLUMNS", "200")
     counts = {"contacts": 3, "listed": 4, "found": 3, "missed": 0}
-    row: dict[str, object] = {"recording": "run.csv", "observer": "gmo", "signal": "torque"}
+    row: dict[str, object] = {"recording": "run.csv", "observer": "best"}
     row |= {k if k == "contacts" else f"{k}_contacts": count for k, count in counts.items()}
     row |= {"false_alarms": 0, "false_alarms_per_h": 0.0, "detection_delay_s": 0.04}
     row |= {"longest_delay_s": None}
     (grid,) = contact_grids(pl.DataFrame([row, row | {"contacts": None}]))
     assert terminal(grid).splitlines()[2].split() == [
-        "run.csv", "gmo", "torque", "3", "4", "3", "0", "0", "0", "0.040", "–",
+        "run.csv", "best", "3", "4", "3", "0", "0", "0", "0.040", "–",
     ]  # fmt: skip
     assert list(contact_grids(pl.DataFrame({"recording": ["a"]}))) == []
 

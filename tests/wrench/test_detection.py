@@ -1,35 +1,20 @@
-"""Contacts against the true ones: hysteresis, matching, limits, free part, settling."""
+"""Contacts against the true ones: hysteresis, matching, limits."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-from vftcli.observers import MomentumObserver
-from vftcli.readers.reading import read
-from vftcli.robots import load_robot
-from vftcli.robots.run import Run, RunSamples
-from vftcli.signals.errors import ParameterError
 from vftcli.signals.external_torque import ExternalTorque
-from vftcli.signals.wrench import Wrench
 from vftcli.wrench.detection import (
-    LEAST_TORQUE,
     ContactInterval,
-    ContactScore,
-    KnownContacts,
     assignment,
-    departure,
     find_contacts,
     floor_in_motion,
     judge_contacts,
-    learned_free,
     match_contacts,
-    read_in_free_runs,
     true_contacts,
 )
-from vftcli.wrench.sensor import SensorReading, zero_drift
-from vftcli.wrench.solvers import VirtualSensor
 
 T = np.arange(0.0, 20.0, 0.01)
 
@@ -48,13 +33,6 @@ def reference(height: float, floor: float | None = None) -> ExternalTorque:
     tau = np.outer(push(height), [1.0, 0.0])
     floors = None if floor is None else np.array([floor, np.nan])
     return ExternalTorque(name="truth", t=T, tau=tau, floor=floors)
-
-
-def judged(tau, truth=None, known=None) -> ContactScore:
-    """An estimate's torque against the true one, else 2 N·m."""
-    estimate = ExternalTorque(name="gmo", t=T, tau=tau)
-    (score,) = judge_contacts([estimate], None, truth or reference(2.0), known)
-    return score
 
 
 def test_hits_misses_false_alarms_and_delays_are_counted():
@@ -89,15 +67,6 @@ def test_as_many_contacts_as_possible_are_credited():
     assert assignment([ContactInterval(2.05, 2.5)], true[:1]) == [0]
     late = match_contacts([ContactInterval(2.15, 2.5)], true[:1], 10.0)
     assert (late.missed, late.false_alarms) == (1, 0)
-
-
-def test_the_free_band_reaches_a_third_beyond_the_free_part():
-    """About a median of 0 and of 5: 1.3 times 2, and half a newton-metre at least."""
-    quiet = np.array([[-1.0, 5.1], [0.0, 5.0], [2.0, 4.9], [np.nan, 9.0]])
-    values = np.array([[2.6, 5.0], [-5.2, 5.4], [0.0, 6.5], [np.nan, np.nan], [1.3, np.nan]])
-    np.testing.assert_allclose(departure(values, quiet, 0.5), [1.0, 2.0, 3.0, 0.0, 0.5])
-    with pytest.raises(ParameterError, match="holds no sample"):
-        departure(values, quiet[3:], 0.5)
 
 
 @pytest.mark.parametrize(
@@ -138,7 +107,7 @@ def test_what_begins_too_early_or_late_is_false(start, false):
 def test_contacts_of_an_exact_reference_are_parted_by_a_shorter_pause(pause, floor, count):
     tau = np.outer(push(2.0, 5.0, 6.0) + push(2.0, 6.0 + pause, 7.0), [1.0, 0.0])
     known = replace(reference(2.0, floor), tau=tau)
-    assert judged(tau, known).detection.contacts == count
+    assert judge_contacts((), known).contacts == count
 
 
 def test_true_contacts_exceed_half_a_newton_metre_on_any_joint():
@@ -151,8 +120,7 @@ def test_true_contacts_exceed_half_a_newton_metre_on_any_joint():
 
 def test_a_reference_with_a_floor_calls_only_what_exceeds_five_times_it_a_contact():
     for floor, count in ((None, 1), (0.5, 0)):
-        score = judged(reference(2.0).tau, reference(2.0, floor))
-        assert score.detection.contacts == count
+        assert judge_contacts((), reference(2.0, floor)).contacts == count
 
 
 def test_stiction_at_rest_deafens_no_reference():
@@ -164,83 +132,8 @@ def test_stiction_at_rest_deafens_no_reference():
     np.testing.assert_allclose(floor_in_motion(one), [1.0, 1.0, 5.0])
 
 
-def test_settling_is_no_contact():
-    score = judged(reference(2.0).tau + np.exp(-5.0 * T)[:, None] * 50.0)
-    assert score.detection.false_alarms == 0
-    assert score.detection.delay == (0.0,)
-    # nor is what stays in the narrowest band, half a newton-metre
-    assert judged(reference(0.9 * LEAST_TORQUE).tau).detection.missed == 1
-
-
-def reading(values: np.ndarray, zero: tuple[float, float] | None) -> SensorReading:
-    wrench = Wrench(name="gmo", t=T, values=values, frame="base")
-    free = (zero[0] <= T) & (zero[1] >= T) if zero else np.zeros(len(T), dtype=bool)
-    drifts = (zero_drift(wrench, zero),) if zero else ()
-    found = {"wrenches": (wrench,), "masked": wrench.hidden, "drifts": drifts, "free": free}
-    return SensorReading(sensor=VirtualSensor(frame="base"), **found)
-
-
-def test_contacts_are_reported_from_wrenches_where_there_are_some():
-    values = np.zeros((len(T), 6))
-    values[:, 2] = push(8.0)
-    values[:, 0] = push(5.0, 12.0, 18.0)  # within the zero span, so part of its band
-    (before,) = judge_contacts([], reading(values, None), reference(2.0))
-    assert before.signal == "wrench"
-    assert (before.detection.missed, before.detection.false_alarms) == (0, 1)
-    (zeroed,) = judge_contacts([], reading(values, (11.0, 19.0)), reference(2.0))
-    assert (zeroed.detection.missed, zeroed.detection.false_alarms) == (0, 0)
-
-
-def test_the_free_part_lasts_from_settling_to_the_first_contact():
-    true = contacts((5.0, 7.0))
-    np.testing.assert_array_equal(learned_free(T, true), (T >= 1.0) & (true[0].start > T))
-    assert learned_free(T, ())[-2]
-    with pytest.raises(ParameterError, match=r"begins at 1\.05 s.* no free part.*--free A:B"):
-        learned_free(T, contacts((1.05, 7.0)))
-
-
 def test_what_is_listed_is_judged_as_it_stands():
     """Two rows for one push: one is credited, the other a piece."""
-    reported = KnownContacts(
-        untouched=np.zeros(len(T), dtype=bool),
-        listed={"gmo": (ContactInterval(5.0, 5.8), ContactInterval(6.0, 7.0))},
-    )
-    score = judged(np.zeros((len(T), 2)), known=reported)
-    detection = score.detection
-    assert score.signal == "list"
+    listed = (ContactInterval(5.0, 5.8), ContactInterval(6.0, 7.0))
+    detection = judge_contacts(listed, reference(2.0))
     assert (detection.found, detection.listed, detection.false_alarms) == (1, 2, 0)
-
-
-def test_the_band_is_learned_where_the_arm_is_known_to_be_free():
-    """A bump of 5 N·m at 12 s is a false alarm, unless the free part or a free run shows it."""
-    tau = reference(8.0).tau + np.outer(push(5.0, 12.0, 13.0), [1.0, 0.0])
-
-    def alarms(reported: KnownContacts | None) -> int:
-        score = judged(tau, reference(8.0), reported)
-        assert score.detection.missed == 0
-        return score.detection.false_alarms
-
-    nothing = np.zeros(len(T), dtype=bool)
-    assert alarms(None) == 1
-    assert alarms(KnownContacts(untouched=nothing)) == 1
-    assert alarms(KnownContacts(untouched=(T > 11.0) & (T < 14.0))) == 0
-    beside = np.outer(np.linspace(-5.0, 5.0, 50), [1.0, 0.1])
-    assert alarms(KnownContacts(untouched=nothing, beside={"gmo": beside})) == 0
-
-
-def test_observers_are_run_along_free_runs():
-    log = read(Path(__file__).parents[2] / "fixtures" / "ur5_circle.csv")
-    run = Run(recording=log, robot=load_robot("ur5"))
-    piece = RunSamples(run, (log.t > 0.3) & (log.t < 4.0))
-    gmo = MomentumObserver(gain=10.0)
-
-    def read_by(pieces, sensor):
-        return read_in_free_runs(pieces, [gmo], lambda _name, run: run, sensor)
-
-    torques = read_by([piece], None)["gmo"]
-    # From the settling, at 1 s, to 4 s.
-    settled = (log.t >= 1.0) & (log.t < 4.0)
-    np.testing.assert_array_equal(torques, gmo.estimate(run.terms).tau[settled])
-    wrenches = read_by([piece], VirtualSensor(frame="base"))["gmo"]
-    assert wrenches.shape == (len(torques), 6)
-    assert read_by([], None) == {}

@@ -120,7 +120,7 @@ def reading(*removed: bool) -> SensorReading:
     wrench = Wrench(name="gmo", t=TIMES, values=force(0.08), frame="base", masked=TIMES > 19.0)
     drifts = tuple(zero_drift(wrench, SPAN)._replace(removed=flag) for flag in removed)
     found = {"wrenches": (wrench,), "masked": wrench.hidden, "drifts": drifts}
-    return SensorReading(sensor=VirtualSensor(frame="base"), free=TIMES < 4.0, **found)
+    return SensorReading(sensor=VirtualSensor(frame="base"), **found)
 
 
 def test_a_sensors_own_zero_goes_where_the_readings_went():

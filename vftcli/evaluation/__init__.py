@@ -33,7 +33,7 @@ class ReferenceChoice(Choice):
         str | None,
         Option("--reference-columns", "SPEC", "Name the columns of a reference file."),
     ] = None
-    #: Whether to compare each observer's contacts with the reference's too.
+    #: Whether to compare the listed contacts with the reference's too.
     contacts: bool = False
 
     def __post_init__(self) -> None:

@@ -31,7 +31,6 @@ from vftcli.signals.errors import (
     MissingSignalError,
     ParameterError,
     ReferenceTorqueError,
-    VftError,
 )
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.option import interval_text
@@ -39,7 +38,7 @@ from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, caution, fact
 from vftcli.signals.wrench import AXES, Wrench, WrenchFrame
 from vftcli.wrench import WrenchChoice, ZeroChoice
-from vftcli.wrench.detection import ContactScore, KnownContacts, judge_contacts
+from vftcli.wrench.detection import ContactInterval, Detection, judge_contacts
 from vftcli.wrench.sensor import RESEMBLES, SensorReading, fit_axes, with_reference
 from vftcli.wrench.solvers import (
     LEAST_SIGMA,
@@ -103,15 +102,13 @@ def evaluate_wrenches(
     return tidy(rows, WRENCH_SCHEMA)
 
 
-#: Columns where contacts are judged: one row an observer; `signal` is "torque", "wrench"
-#: or "list".
+#: Columns where contacts are judged: one row a list.
 #:
 #: Rows neither credited to a true contact nor false alarms are pieces of one, or its echo.
 CONTACT_SCHEMA: Schema = {
     "recording": pl.String,
     "observer": pl.String,
     "reference": pl.String,
-    "signal": pl.String,
     "contacts": pl.Int64,
     "listed_contacts": pl.Int64,
     "found_contacts": pl.Int64,
@@ -124,15 +121,13 @@ CONTACT_SCHEMA: Schema = {
 
 
 def with_contacts(
-    errors: pl.DataFrame, recording: str, reference: str, contacts: Iterable[ContactScore]
+    errors: pl.DataFrame, recording: str, reference: str, of: Detection
 ) -> pl.DataFrame:
-    """The errors, and below them one row an observer on its contacts."""
-    rows = []
-    for score in contacts:
-        of, own = score.detection, (recording, score.name, reference, score.signal)
-        counts = of.contacts, of.listed, of.found, of.missed, of.false_alarms
-        row = (*own, *counts, of.false_alarms_per_h, of.mean_delay, of.longest_delay)
-        rows.append(dict(zip(CONTACT_SCHEMA, row, strict=True)))
+    """The errors, and below them one row on the list of contacts."""
+    counts = of.contacts, of.listed, of.found, of.missed, of.false_alarms
+    delays = of.false_alarms_per_h, of.mean_delay, of.longest_delay
+    row = (recording, BEST, reference, *counts, *delays)
+    rows = [dict(zip(CONTACT_SCHEMA, row, strict=True))]
     return pl.concat([errors, tidy(rows, CONTACT_SCHEMA)], how="diagonal")
 
 
@@ -347,11 +342,11 @@ def judge(
     estimates: Sequence[ExternalTorque],
     sensed: SensorReading | None,
     choice: ReferenceChoice,
-    known: KnownContacts | None = None,
+    listed: Sequence[ContactInterval] | None = None,
 ) -> tuple[ExternalTorque, pl.DataFrame, SensorReading | None]:
     """The chosen reference, and errors of estimates and of their wrenches, if any.
 
-    Contacts are compared by `known`.
+    Contacts are compared where they are `listed`.
 
     Raises:
         ReferenceTorqueError: If the reference cannot be made.
@@ -366,13 +361,9 @@ def judge(
         sensed = with_reference(sensed, theirs, of_sensor=choice.name == "sensor")
         rows = evaluate_wrenches(recording.name, sensed.wrenches, sensed.reference or theirs)
         errors = pl.concat([errors, rows], how="diagonal")
-    if choice.contacts:
-        try:
-            scores = judge_contacts(estimates, sensed, reference, known)
-            errors = with_contacts(errors, recording.name, reference.name, scores)
-        except VftError as error:
-            reason = caution("contacts-not-judged", reason=str(error))
-            reference = replace(reference, remarks=(*reference.remarks, reason))
+    if listed is not None:
+        found = judge_contacts(listed, reference)
+        errors = with_contacts(errors, recording.name, reference.name, found)
     return reference, errors, sensed
 
 

@@ -29,7 +29,6 @@ SURE = 0.05  #: A difference of two observers is sure below this p.
 CONTACTS = {
     "recording": "recording",
     "observer": "observer",
-    "signal": Column("seen in", words=True, seldom=True),
     "contacts": Column("contacts"),
     "listed_contacts": Column("rows"),
     "found_contacts": Column("found"),
@@ -127,7 +126,7 @@ def bench_grid(result: Record) -> Grid:
 
 
 def contact_grids(errors: "pl.DataFrame | None") -> Iterator[Grid]:
-    """Contact detection by recording and observer, if any."""
+    """Contact detection by recording, if any."""
     if errors is None or "contacts" not in errors.columns:
         return
     if len(rows := errors.drop_nulls("contacts")):

@@ -1,34 +1,21 @@
-"""Contacts of every observer, or of a list, against the true ones, one to one.
+"""Listed contacts against the true ones of a reference, one to one."""
 
-A contact is where a wrench or joint torque leaves its free band, its untouched reading.
-"""
-
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
-from vftcli.observers.observer import Observer
-from vftcli.robots.run import Run, RunSamples
 from vftcli.signals.arrays import Array, Mask, intervals, rms_of_known, runs_of
-from vftcli.signals.errors import ParameterError
 from vftcli.signals.external_torque import ExternalTorque
-from vftcli.wrench.sensor import SETTLING, SensorReading
-from vftcli.wrench.solvers import VirtualSensor
 
 #: A contact ends where the score falls below this share of its threshold, 1: hysteresis.
 LEAVE = 0.6
 HOLD = 0.02  #: Shortest contact, longer than one noisy sample. [s]
 GAP = 0.25  #: Contacts closer than this are one: a hand that slips. [s]
-#: The free band reaches this far beyond the largest departure seen in the free part.
-BAND = 1.3
 #: An alarm this long before a true contact, or behind its end, is false: slow observers
 #: show a contact for a while. [s]
 EARLY, LATE = 0.1, 1.0
 TRUE_TORQUE = 0.5  #: A true joint torque beyond this is a contact. [N·m]
-#: A true contact, and least half width of a free band. (6,) [N, N·m]
-WRENCH_LIMITS = np.repeat([1.0, 0.2], 3)
-LEAST_TORQUE = 0.5  #: Smallest half width of a free band of joint torques. [N·m]
 #: Contacts of an exact reference closer than this are one; a measured one uses `GAP`. [s]
 TRUE_GAP = 0.12
 
@@ -58,20 +45,6 @@ def find_contacts(t: Array, score: Array, gap: float = GAP) -> tuple[ContactInte
         # It starts where 1 is exceeded, not at the lower threshold.
         inside[begin:end] = np.logical_or.accumulate(score[begin:end] > 1.0)
     return contact_intervals(t, inside, HOLD, gap)
-
-
-def departure(values: Array, quiet: Array, least: Array | float) -> Array:
-    """Largest departure of any column, in half widths of the free band. (T,)
-
-    The band is the median of the untouched readings (S, k) ± `BAND` × their largest
-    departure, at least `least`; 0 if unknown.
-    """
-    inside = quiet[np.isfinite(quiet).all(axis=1)]
-    if len(inside) == 0:
-        raise ParameterError("the free part holds no sample in which the wrench is known")
-    centre = np.median(inside, axis=0)
-    half = np.maximum(BAND * abs(inside - centre).max(axis=0), least)
-    return np.asarray(np.nan_to_num(abs(values - centre) / half, nan=0.0).max(axis=1))
 
 
 class Detection(NamedTuple):
@@ -152,55 +125,6 @@ def match_contacts(
     )
 
 
-class ContactScore(NamedTuple):
-    """Detection of contacts by one observer."""
-
-    name: str  #: The observer.
-    signal: str  #: Its source: "torque", "wrench", or "list" of contacts.
-    detection: Detection  #: Counts and delays.
-
-
-class KnownContacts(NamedTuple):
-    """Knowledge of a log's contacts before they are judged."""
-
-    #: Samples of the log that are known to be free, if any. (T,)
-    untouched: Mask
-    #: Each observer's readings in free runs of other logs, by name. (S, k) each
-    beside: Mapping[str, Array] = {}
-    #: Contacts of a list, by the observer that gave the wrench.
-    listed: Mapping[str, Sequence[ContactInterval]] = {}
-
-
-def read_in_free_runs(
-    pieces: Sequence[RunSamples],
-    observers: Sequence[Observer],
-    run_of: Callable[[str, Run], Run],
-    sensor: VirtualSensor | None,
-) -> dict[str, Array]:
-    """Settled readings in free runs by observer's name: (S, 6) or (S, n)."""
-    read: dict[str, list[Array]] = {}
-    for piece in pieces:
-        t, q, chain = piece.run.t, piece.run.q, piece.run.robot.chain
-        settled = piece.inside & (t >= t[0] + SETTLING)
-        for observer in observers:
-            torque = observer.estimate(run_of(observer.name, piece.run).terms)
-            values = torque.tau if sensor is None else sensor.wrench(torque, q, chain).known
-            read.setdefault(observer.name, []).append(values[settled])
-    return {name: np.concatenate(each) for name, each in read.items()}
-
-
-def learned_free(t: Array, true: Sequence[ContactInterval]) -> Mask:
-    """Samples from `SETTLING` after the start to the first true contact. (T,)"""
-    first = true[0].start if true else t[-1]
-    free: Mask = (t >= t[0] + SETTLING) & (t < first)
-    if np.count_nonzero(free) < 10:
-        raise ParameterError(
-            f"contacts: the first true one begins at {first:g} s, so there is no free part to "
-            f"learn the band from; name one with --free A:B"
-        )
-    return free
-
-
 def floor_in_motion(reference: ExternalTorque) -> Array:
     """A reference's own error while a joint moves, zero if not stated. (n,) [N·m]
 
@@ -220,38 +144,7 @@ def true_contacts(reference: ExternalTorque) -> tuple[ContactInterval, ...]:
     return find_contacts(reference.t, score, TRUE_GAP if reference.floor is None else GAP)
 
 
-def judge_contacts(
-    estimates: Sequence[ExternalTorque],
-    measured: SensorReading | None,
-    reference: ExternalTorque,
-    known: KnownContacts | None = None,
-) -> tuple[ContactScore, ...]:
-    """Every observer's contacts against those of a reference torque.
-
-    A list of contacts is judged if an observer has one. Otherwise contacts are found in the
-    wrenches if asked for, else in the joint torques, by a free band: from the zero spans,
-    else the log's free part, else free runs, else before the first true contact.
-    """
-    t, true = reference.t, true_contacts(reference)
-    kind, least = "torque", np.asarray(LEAST_TORQUE)
-    signals = {estimate.name: estimate.tau for estimate in estimates}
-    if measured is not None:
-        kind, least = "wrench", WRENCH_LIMITS
-        signals = {wrench.name: wrench.known for wrench in measured.wrenches}
-    known = known or KnownContacts(untouched=np.zeros(len(t), bool))
-    settled = t >= t[0] + SETTLING
-    quiet = known.untouched & settled
-    if measured is not None and measured.drifts:
-        quiet = measured.free
-    scores = []
-    for name, values in signals.items():
-        found, of = known.listed.get(name), "list"
-        if found is None:
-            free = values[quiet] if quiet.any() else known.beside.get(name, values[:0])
-            if not len(free):
-                free = values[learned_free(t, true)]
-            # Observers rise from zero, which is no contact.
-            score = np.where(settled, departure(values, free, least), 0.0)
-            found, of = find_contacts(t, score), kind
-        scores.append(ContactScore(name, of, match_contacts(found, true, t[-1] - t[0])))
-    return tuple(scores)
+def judge_contacts(listed: Sequence[ContactInterval], reference: ExternalTorque) -> Detection:
+    """Agreement of listed contacts with those of a reference."""
+    t = reference.t
+    return match_contacts(listed, true_contacts(reference), t[-1] - t[0])

@@ -143,7 +143,6 @@ def sense(
         wrenches=tuple(wrenches),
         masked=hidden,
         drifts=tuple(chained.from_iterable(drifts)),
-        free=free,
         smoothed=smoothed,
         remarks=(
             *warnings,

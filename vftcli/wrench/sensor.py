@@ -248,8 +248,6 @@ class SensorReading(Shown):
     wrenches: tuple[Wrench, ...]  #: One an observer, drift removed where a zero was given.
     masked: Mask  #: Samples in which the pose hides the wrench. (T,)
     drifts: tuple[Drift, ...] = ()  #: Zero drift, one an unloaded span and observer.
-    #: Unloaded samples: of the zero spans, or of the start. (T,)
-    free: Mask
     #: The smoother's wrenches, by observer.
     smoothed: Mapping[str, SmoothedWrench] = field(default_factory=dict)
     #: The wrench that the others are compared with, in the same frame, or None.
