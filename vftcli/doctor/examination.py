@@ -37,8 +37,6 @@ REFUSING = NO_FIT | {
 }  # fmt: skip
 #: Findings on the size of a current, which a model of the arm knows better.
 SIZED = CORRECTIONS.keys() - {"torque-with-gravity"}
-#: Findings that every command reports: nothing is wrong, but results rest on assumptions.
-ASSUMPTIONS = frozenset({"no-temperature", "temperature-gaps"})
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -68,8 +66,8 @@ class Examination(Shown):
 
     @property
     def assumptions(self) -> tuple[Remark, ...]:
-        """The findings on assumptions of the model where the log is silent."""
-        return tuple(finding for finding in self.findings if finding.code in ASSUMPTIONS)
+        """The findings on assumptions of the model, which every command reports."""
+        return tuple(f for f in self.findings if f.code == "no-temperature")
 
     @cached_property
     def warnings(self) -> tuple[Remark, ...]:

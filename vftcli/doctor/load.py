@@ -114,9 +114,6 @@ def load_change(case: Case) -> Remark | None:
 PER_KELVIN = 0.015
 #: Temperature difference at which friction is 8–15 % off. [K]
 FAR = 7.0
-ASSUMED = 10.0  #: `FAR` where the robot file does not state that temperature. [K]
-#: Range of the law: measured from 28 to 46 °C, and 15 to 20 K beyond. [°C]
-HOLDS = (15.0, 65.0)
 NOTICED = 0.2  #: Friction that is worth a finding. [N·m]
 
 
@@ -125,49 +122,39 @@ def temperature_findings(recording: Recording, robot: Robot) -> Iterator[Remark]
     if not robot.friction or recording.joints != robot.joints or recording.dq is None:
         return
     temperature = measured_temperature(recording)
+    if temperature is not None:
+        yield from far_temperature(recording, robot, temperature)
+        return
     lawful = np.array([j for j, joint in enumerate(robot.friction) if joint.temperature], int)
     reference = [robot.friction[j].reference_temperature for j in lawful]
-    values = {"reference_C": sorted(set(reference)), "robot": robot.name}
-    if temperature is not None:
-        unknown = np.isnan(temperature[:, lawful])
-        if unknown.any():
-            gaps = unknown.any(axis=0)
-            share = 100.0 * unknown[:, gaps].mean()
-            yield fact("temperature-gaps", on_joints(lawful[gaps]), **values, share_percent=share)
-        yield from far_temperature(recording, robot, temperature)
-    elif lawful.size:
-        colder = np.full((1, robot.joints), np.nan)
-        colder[0, lawful] = np.array(reference) - 10.0
-        if (factor := friction_factor(robot.friction, colder)) is not None:
-            more = 100.0 * (factor[0, lawful] - 1.0)
-            values |= {"least_percent": more.min(), "most_percent": more.max()}
-            yield fact("no-temperature", **values)
+    colder = np.full((1, robot.joints), np.nan)
+    colder[0, lawful] = np.array(reference) - 10.0
+    if (factor := friction_factor(robot.friction, colder)) is not None:
+        more = 100.0 * (factor[0, lawful] - 1.0)
+        values = {"least_percent": more.min(), "most_percent": more.max()}
+        values |= {"reference_C": sorted(set(reference)), "robot": robot.name}
+        yield fact("no-temperature", **values)
 
 
 def far_temperature(recording: Recording, robot: Robot, temperature: Array) -> Iterator[Remark]:
     """Joints with a temperature (T, n) [°C], NaN unknown, far from the model's."""
-    far: dict[str, list[tuple[int, float, float, float]]] = {}
+    far = []
     speeds = abs(recording.require("dq"))
     for j, joint in enumerate(robot.friction):
         used = (speeds[:, j] > MOVES) & ~np.isnan(temperature[:, j])
-        if joint.model == "none" or not used.any():
+        # A law follows the temperature.
+        known = joint.temperature_at is not None and not joint.temperature
+        if joint.model == "none" or not known or not used.any():
             continue
-        reference = low = high = joint.reference_temperature
-        code, least = "far-temperature", FAR
-        if joint.temperature:
-            code, (low, high), least = "temperature-beyond-law", HOLDS, 0.0
-        elif joint.temperature_at is None:
-            code, least = "far-temperature-assumed", ASSUMED
-        coldest, warmest = np.percentile(temperature[used, j], [5.0, 95.0])
-        below, above = low - coldest, warmest - high
-        seen, colder = (coldest, below) if below > above else (warmest, -above)
+        ends = np.percentile(temperature[used, j], [5.0, 95.0])
+        reference = joint.reference_temperature
+        seen = ends[abs(ends - reference).argmax()]
         torque = steady_torque(joint, np.median(speeds[used, j], keepdims=True))[0]
-        wrong = abs(torque * np.expm1(PER_KELVIN * colder))
-        if max(below, above) > least and wrong >= NOTICED:
-            far.setdefault(code, []).append((j, seen, reference, wrong))
-    for code, rows in far.items():
-        joints, ends, references, torques = zip(*rows, strict=True)
-        level = caution if code == "far-temperature-assumed" else warning
-        values = {"seen_C": list(ends), "reference_C": sorted(set(references))}
-        values |= {"wrong_Nm": list(torques), "range_C": list(HOLDS)}
-        yield level(code, on_joints(joints), robot=robot.name, **values)
+        wrong = abs(torque * np.expm1(PER_KELVIN * (reference - seen)))
+        if abs(seen - reference) > FAR and wrong >= NOTICED:
+            far.append((j, seen, reference, wrong))
+    if far:
+        joints, seen_C, references, torques = zip(*far, strict=True)
+        values = {"seen_C": list(seen_C), "reference_C": sorted(set(references))}
+        values |= {"wrong_Nm": list(torques)}
+        yield warning("far-temperature", on_joints(joints), robot=robot.name, **values)
