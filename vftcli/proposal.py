@@ -16,7 +16,6 @@ from vftcli.pipeline import AnalysisChoice, analyse, list_touches, prepared, rea
 from vftcli.robots.robot import Robot
 from vftcli.robots.robot_file import lines_of
 from vftcli.robots.run import Run
-from vftcli.robots.terms import effort_name
 from vftcli.signals.errors import MissingSignalError, RobotError, VftError
 from vftcli.signals.parsing import printable
 from vftcli.signals.recording import Recording
@@ -66,11 +65,10 @@ def propose(
         guessed = (r.values["fit"] for r in robot.remarks if r.code == "robot-guessed")
         why = next((f"by {fit}" for fit in guessed), "the log names it")
         yield ProposedOption(why, "robot", robot.name)
-    if "log.effort" not in given:
-        effort = effort_of(recording, robot, choice)
+    effort = None if "log.effort" in given else effort_of(recording, robot, choice)
+    if effort is not None:
         yield effort
-        if effort.holds:
-            choice = replace(choice, read=replace(choice.read, effort=str(effort.value)))
+        choice = replace(choice, read=replace(choice.read, effort=str(effort.value)))
     arm = replace(choice.robot, name=choice.robot.name or robot.name)
     yield from of_known_arm(logs, replace(choice, robot=arm))
 
@@ -104,12 +102,6 @@ def of_known_arm(logs: Sequence[Path], choice: AnalysisChoice) -> Iterator[Propo
 def read_so(recording: Recording) -> Iterator[ProposedOption]:
     """Options for the reading of a log."""
     source = recording.source
-    yield ProposedOption(
-        f"{source.label} is recognised by its content; a file that is not needs this",
-        "log.format",
-        source.format,
-        holds=False,
-    )
     for remark in source.remarks:
         if remark.code == "columns-by-value":
             yield ProposedOption(remark.values["why"], "columns", remark.values["columns"])
@@ -120,17 +112,17 @@ def read_so(recording: Recording) -> Iterator[ProposedOption]:
         yield ProposedOption(words, "payload", "log", holds=False)
 
 
-def effort_of(recording: Recording, robot: Robot, choice: AnalysisChoice) -> ProposedOption:
-    """The kind of a log's effort, by its robot's model."""
+def effort_of(
+    recording: Recording, robot: Robot, choice: AnalysisChoice
+) -> ProposedOption | None:
+    """The kind of a log's effort, if its robot's model finds another."""
     as_called = choice.examiner.read_as(recording, robot, replace(choice.read, effort=None))
     for finding in examine(as_called, robot).findings:
         if (right := CORRECTIONS.get(finding.code)) is not None:
             # A sign or a unit has no own name.
             named = right.kind.replace("_", "-") if right.factor == 1.0 else "auto"
             return ProposedOption(in_words(finding).evidence, "log.effort", named)
-    called = effort_name(recording, robot).replace("_", "-")
-    words = "as the log calls it; the robot's model explains no other reading clearly better"
-    return ProposedOption(words, "log.effort", called, holds=False)
+    return None
 
 
 def free_log(log: Path, choice: AnalysisChoice) -> ProposedOption:

@@ -25,9 +25,8 @@ from vftcli.simulation.scenario import FOLDER
 
 
 def options(folder: Path) -> dict[str, object]:
-    """What is taken; a group of settings that are only there to be taken is empty."""
-    found = tomllib.loads((folder / NAME).read_text("utf-8"))
-    return {key: value for key, value in found.items() if value != {}}
+    """What is taken."""
+    return tomllib.loads((folder / NAME).read_text("utf-8"))
 
 
 @pytest.mark.slow
@@ -57,8 +56,6 @@ def test_each_option_stands_under_its_reason(run, here: Path) -> None:
         'interval = "0:9"': "# as given",
         'robot = "ur5"': "# as given",
         'reference = "two-cycle"': "# the free motion is known too: the reference is the diff",
-        '# format = "ur-csv"': "# ur5_circle.csv is recognised by its content; a file that is not",
-        '# effort = "current"': "# as the log calls it; the robot's model explains no other",
     }
     assert [option for option, why in reasons.items() if why.startswith("# ")] == [*expected]
     assert all(reasons[option].startswith(why) for option, why in expected.items())
