@@ -316,13 +316,6 @@ def test_the_robots_own_estimate_may_be_the_reference(free: Path, pushed: Path, 
     assert check["smallest_detected_N"] is None
 
 
-def test_two_free_logs_are_counted_against_each_other(free: Path, pushed: Path, ran) -> None:
-    out = ran("thresholds", free, pushed, *COLUMNS, "--rate", 60, "--json")[0]
-    counted = {row["log"]: row for row in json.loads(out)["left_out"]}
-    assert counted["pushed.npy"]["joints"][1] >= 1
-    assert counted["free.npy"]["joints"][1] == 0
-
-
 @pytest.mark.slow
 def test_a_simulated_log_is_checked_against_the_truth_beside_it(ran, refused) -> None:
     words = ("--robot", "panda", "--rate", 60, "--anyway")

@@ -15,11 +15,12 @@ import argparse
 import sys
 from dataclasses import replace
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
-from vftcli.contacts.threshold_check import CountedAlarms, compared_signals, counted_alarms
-from vftcli.contacts.thresholds import BLOCK, SETTLING, ComparedSignals, find_thresholds
+from vftcli.contacts.threshold_check import compared_signals
+from vftcli.contacts.thresholds import BLOCK, SETTLING, ComparedSignals, events, find_thresholds
 from vftcli.readers.reading import read
 from vftcli.robots import load_robot
 from vftcli.robots.run import Run
@@ -37,7 +38,15 @@ def part(signals: ComparedSignals, start: float, stop: float) -> ComparedSignals
     return replace(signals, recording=taken, torque=torque, wrench=wrench)
 
 
-def counts(path: Path, robot: str) -> dict[float, CountedAlarms]:
+class Count(NamedTuple):
+    """Passages of the thresholds of a log."""
+
+    log: str
+    due: float  # Those of any joint that the rate allows.
+    joints: tuple[int, ...]  # Those of every joint.
+
+
+def counts(path: Path, robot: str) -> dict[float, Count]:
     """What the second half counts at the thresholds of the first, by the rate of one joint."""
     # As RTDE has it, without an estimate of the robot's own: the momentum observer stands for it.
     recording = replace(read(path), tau_ext=None)
@@ -47,16 +56,18 @@ def counts(path: Path, robot: str) -> dict[float, CountedAlarms]:
     learn = part(signals, t0, middle)
     # Nothing settles in the middle of a log: what the counting leaves out lies before it.
     count = part(signals, middle - SETTLING, float(signals.t[-1]) + BLOCK)
-    found = {}
+    hours, found = (count.recording.duration - SETTLING) / 3600.0, {}
     for rate in RATES:
         thresholds = find_thresholds([learn], rate * signals.torque.shape[1])
-        found[rate] = counted_alarms(count, thresholds)
+        level = thresholds.level("joints", count)
+        passages = tuple(len(events(count.t, column)) for column in level.T)
+        found[rate] = Count(path.name, hours * thresholds.rate, passages)
         values = " ".join(f"{one.value:6.2f}" for one in thresholds.joints)
         sys.stdout.write(f"{path.name} {rate:4g}/h  N·m {values}  counted {found[rate].joints}\n")
     return found
 
 
-def failures(found: list[dict[float, CountedAlarms]]) -> list[str]:
+def failures(found: list[dict[float, Count]]) -> list[str]:
     wrong = []
     for one in found:
         often, rare = one[60.0], one[12.0]

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from vftcli.contacts.threshold_check import CheckedContact, CountedAlarms, ThresholdDetection
+from vftcli.contacts.threshold_check import CheckedContact, ThresholdDetection
 from vftcli.contacts.thresholds import SignalThreshold, Thresholds, tail_of
 from vftcli.outputs.grid import significant, terminal
 from vftcli.outputs.run_record import jsonable
@@ -93,7 +93,7 @@ def test_what_is_wide_is_no_threshold_and_in_no_call() -> None:
     table = tomllib.loads(calls(some)["toml"])["thresholds"]
     assert not {"force_N", "force_upper_N", "force_size_N"} & set(table)
     assert table["moment_Nm"] == [13.01, 14.01, 15.01]
-    record = thresholds_record(some, (), ())
+    record = thresholds_record(some, ())
     assert [row["threshold_N"] for row in record["axes"][:3]] == [10.001, 11.001, None]
     assert record["force"]["threshold_N"] is None
     assert "–" in terminal(thresholds_grid(some)).splitlines()[-1]
@@ -112,8 +112,7 @@ def check(reference: str | None = "sensor") -> ThresholdDetection:
 
 
 def test_the_record_has_the_keys_of_the_contract_and_is_strict_json() -> None:
-    counted = (CountedAlarms("a.csv", 0.5, 0.5, (0,) * 7, 0, 1),)
-    text = json.dumps(jsonable(thresholds_record(made(), counted, [check()])), allow_nan=False)
+    text = json.dumps(jsonable(thresholds_record(made(), [check()])), allow_nan=False)
     record = json.loads(text)
     assert [row["joint"] for row in record["joints"]] == [1, 2, 3, 4, 5, 6, 7]
     assert record["joints"][0]["interval_Nm"] == [0.0, 2.0]
@@ -125,13 +124,12 @@ def test_the_record_has_the_keys_of_the_contract_and_is_strict_json() -> None:
     (checked,) = record["checks"]
     assert (checked["detected"], checked["smallest_detected_N"]) == (2, 20.0)
     assert checked["contacts"][1]["delay_s"] is None
-    assert record["left_out"][0]["any_axis"] == 1
 
 
 def test_what_has_no_tail_has_no_upper_end_either() -> None:
     short = SignalThreshold(5.0, (5.0, NAN), 1.0, "short.csv", None)
     one = replace(made(1, axes=0), joints=(short,))
-    record = json.loads(json.dumps(jsonable(thresholds_record(one, (), ())), allow_nan=False))
+    record = json.loads(json.dumps(jsonable(thresholds_record(one, ())), allow_nan=False))
     assert record["joints"][0]["interval_Nm"] == [5.0, None]
     assert tomllib.loads(record["calls"]["toml"])["thresholds"]["joint_torque_upper_Nm"] == [5.0]
     assert "short.csv" in terminal(thresholds_grid(one))
@@ -139,9 +137,8 @@ def test_what_has_no_tail_has_no_upper_end_either() -> None:
 
 def test_the_tables_name_every_signal_and_log() -> None:
     """k = 30 of 900 readings of a second, the 31st largest of 0 … 899 on."""
-    counted = (CountedAlarms("a.csv", 0.5, 0.5, (0, 1, 2, 3, 4, 5), 7, 6),)
-    text = thresholds_text(made(6), counted, [check()])
-    table, counts, checked, *texts = text.split("\n\n")
+    text = thresholds_text(made(6), [check()])
+    table, checked, *texts = text.split("\n\n")
     title, heads, *rows, _ = table.splitlines()
     assert title == "Passed without contact 1 × an hour by any joint, or by any axis"
     assert " ".join(heads.split()) == "threshold 95 % free motion [h] set by"
@@ -152,10 +149,6 @@ def test_the_tables_name_every_signal_and_log() -> None:
         shown, low, high = (significant(x) for x in (value + 1e-3, value - 1.0, value + 1.0))
         tail = ["0.250", "free.csv"]
         assert row.split() == [name, shown, units.get(name, "N"), f"{low}–{high}", *tail]
-    assert counts.splitlines()[1:] == [
-        "log    length [h]  expected  any joint  J1  J2  J3  J4  J5  J6  any axis",
-        "a.csv       0.500     0.500          7   0   1   2   3   4   5         6",
-    ]
     *lines, line = checked.splitlines()
     assert lines == [
         "pushed.csv: contacts at these thresholds",

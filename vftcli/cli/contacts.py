@@ -93,7 +93,7 @@ def contact_thresholds(
     Example: vftcli thresholds free.csv --robot ur5 --rate 1 --check pushed.csv
     """
     from vftcli.answering import free_thresholds, modelled
-    from vftcli.contacts.threshold_check import check_contacts, compared_signals, left_out
+    from vftcli.contacts.threshold_check import check_contacts, compared_signals
     from vftcli.contacts.thresholds import check_alike
     from vftcli.evaluation.references import make_reference
     from vftcli.free_motion.free_motion import FreeMotion
@@ -109,7 +109,6 @@ def contact_thresholds(
             "--reference says where a log was touched: name that with --check LOG"
         )
     free, signals, thresholds = free_thresholds(logs, choice, rate)
-    counted = left_out(signals, rate)
     checks = []
     for log in check or ():
         pushed = modelled(library.open(log, choice.read.whole), choice)
@@ -118,7 +117,7 @@ def contact_thresholds(
         truth = make_reference(FreeMotion(log=pushed), named) if named else (None, None)
         checks.append(check_contacts(compared, thresholds, *truth))
     if json:
-        record = thresholds_record(thresholds, counted, checks)
+        record = thresholds_record(thresholds, checks)
         health = health_record(choice.examiner.examinations)
         say_json(
             [run.recording for run in free], thresholds.remarks, **record, examination=health
@@ -129,7 +128,7 @@ def contact_thresholds(
     say_robots(choice.examiner.robots)
     for remark in (*thresholds.remarks, *(remark for one in checks for remark in one.remarks)):
         say(f"{'warning' if remark.level == 'warning' else 'note'}: {remark}")
-    echo(thresholds_text(thresholds, counted, checks), nl=False)
+    echo(thresholds_text(thresholds, checks), nl=False)
 
 
 def settled_reference(recording: "Recording") -> "ReferenceChoice | None":

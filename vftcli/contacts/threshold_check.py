@@ -1,4 +1,4 @@
-"""Logs against thresholds: signals, false alarms, detected contacts.
+"""Logs against thresholds: signals, detected contacts.
 
 They check the log's own estimate, as a robot does; else a momentum observer of 10 1/s.
 """
@@ -9,12 +9,10 @@ from typing import NamedTuple
 import numpy as np
 
 from vftcli.contacts.thresholds import (
-    LONG_ENOUGH,
     SETTLING,
     ComparedSignals,
     Thresholds,
     events,
-    find_thresholds,
     worst_of,
 )
 from vftcli.observers.paper import MomentumObserver
@@ -153,38 +151,3 @@ def checked(
     delay, by = begun[0] if begun else (np.nan, "")
     above = not by and any(alarm.start < contact.start <= alarm.stop for _, alarm in alarms)
     return CheckedContact(*contact, peak, delay, by, above)
-
-
-class CountedAlarms(NamedTuple):
-    """False alarms of one free log, at thresholds learned without it."""
-
-    log: str  #: The log.
-    hours: float  #: Its length without the settling. [h]
-    due: float  #: False alarms of any joint that the rate allows.
-    joints: tuple[int, ...]  #: Those of every joint alone.
-    any_joint: int  #: Those of all joints together.
-    any_axis: int  #: Those of all axes together.
-
-
-def counted_alarms(signals: ComparedSignals, thresholds: Thresholds) -> CountedAlarms:
-    """Passages of thresholds along a log."""
-    t, joints = signals.t, thresholds.level("joints", signals)
-    hours = max(signals.recording.duration - SETTLING, 0.0) / 3600.0
-    return CountedAlarms(
-        log=signals.recording.name,
-        hours=hours,
-        due=hours * thresholds.rate,
-        joints=tuple(len(events(t, column)) for column in joints.T),
-        any_joint=len(events(t, worst_of(joints))),
-        any_axis=len(events(t, worst_of(thresholds.level("axes", signals)))),
-    )
-
-
-def left_out(free: Sequence[ComparedSignals], rate: float) -> tuple[CountedAlarms, ...]:
-    """False alarms of every free log at long enough others' thresholds."""
-    others = ([*free[:k], *free[k + 1 :]] for k in range(len(free)))
-    return tuple(
-        counted_alarms(signals, find_thresholds(rest, rate))
-        for signals, rest in zip(free, others, strict=True)
-        if any(one.recording.duration >= LONG_ENOUGH for one in rest)
-    )

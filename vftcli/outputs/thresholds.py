@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from math import ceil, isnan
 
-from vftcli.contacts.threshold_check import CountedAlarms, ThresholdDetection
+from vftcli.contacts.threshold_check import ThresholdDetection
 from vftcli.contacts.thresholds import SignalThreshold, Thresholds
 from vftcli.outputs import Record
 from vftcli.outputs.grid import (
@@ -12,7 +12,6 @@ from vftcli.outputs.grid import (
     Column,
     Grid,
     Rows,
-    joint_columns,
     keyed_grid,
     significant,
     terminal,
@@ -39,21 +38,9 @@ CONTACTS = {
 }
 
 
-def thresholds_text(
-    thresholds: Thresholds, counted: Sequence[CountedAlarms], checks: Sequence[ThresholdDetection]
-) -> str:
+def thresholds_text(thresholds: Thresholds, checks: Sequence[ThresholdDetection]) -> str:
     """Tables of thresholds, calls of interfaces, for the terminal."""
     parts = [terminal(thresholds_grid(thresholds)) + LEGEND]
-    if counted:
-        joints = joint_columns(len(counted[0].joints))
-        any_of = (Column("any joint"), *joints, Column("any axis"))
-        rows: Rows = [
-            (one.log, one.hours, one.due, *map(str, (one.any_joint, *one.joints, one.any_axis)))
-            for one in counted
-        ]
-        title = "False alarms of each log at the thresholds of the other logs"
-        columns = "log", Column("length", "h"), Column("expected"), *any_of
-        parts.append(terminal(Grid(columns, rows, title)))
     for check in checks:
         contacts = [
             row | {"by": row["by"] or ("on already" if row["alarm_was_on"] else "missed")}
@@ -97,9 +84,7 @@ def check_line(check: ThresholdDetection) -> str:
     return ", ".join(words)
 
 
-def thresholds_record(
-    thresholds: Thresholds, counted: Sequence[CountedAlarms], checks: Sequence[ThresholdDetection]
-) -> Record:
+def thresholds_record(thresholds: Thresholds, checks: Sequence[ThresholdDetection]) -> Record:
     """Thresholds for machines, units in the names."""
     rows = []
     for shown, of, level, one in thresholds.named:
@@ -124,7 +109,6 @@ def thresholds_record(
         "axes": rows[count : count + axes],
         "force": rows[-1] if thresholds.force else None,
         "calls": calls(thresholds),
-        "left_out": [one._asdict() for one in counted],
         "checks": [
             {
                 "log": check.log,
