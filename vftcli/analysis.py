@@ -41,6 +41,7 @@ class Analysis(Shown):
     estimates: tuple[ExternalTorque, ...]  #: Their estimates, in the same order.
     #: Meaning of each observer's parameters for this log, by name.
     tunings: Mapping[str, Tuning]
+    of_robot_file: bool = False  #: Whether all have the robot file's gains.
     #: Corrections of the estimates by the complete log, or None.
     refinement: "Refinement | None" = None
     #: The wrenches and their limits, or None if none was asked for.

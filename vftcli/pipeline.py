@@ -296,6 +296,7 @@ def observe(
         observers=observers,
         estimates=estimates,
         tunings={o.name: o.tuning(step, log.robot.joints) for o in observers},
+        of_robot_file=choice.observers.of_robot_file,
         remarks=(*remarks, *printed),
     )
 
@@ -397,10 +398,7 @@ def judge(analysis: Analysis, choice: AnalysisChoice) -> Analysis:
     analysis = replace(analysis, reference=reference, errors=errors)
     if sensed is not None:
         analysis = replace(analysis, virtual_sensor=sensed)
-    if not choice.observers.of_robot_file:
-        return analysis
-    gap = references.paper_gap(errors, analysis.tunings)
-    return replace(analysis, remarks=(*analysis.remarks, *gap))
+    return analysis
 
 
 #: Longer logs are analysed in blocks, to bound memory. [samples]

@@ -4,7 +4,6 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-import polars as pl
 import pytest
 from sound_logs import UR10E
 
@@ -12,7 +11,6 @@ from vftcli.bias import AUTOMATIC, RefinementChoice
 from vftcli.bias.baseline import Baseline, Baselines, baseline_of, free_reading
 from vftcli.bias.refine import STICTION, friction_share, limits_remark, refine, with_band
 from vftcli.bias.whole_log import WholeLogBias, stride_of
-from vftcli.evaluation.references import paper_gap
 from vftcli.free_motion import FreeChoice
 from vftcli.free_motion.free_motion import FreeMotion
 from vftcli.observers import MomentumObserver
@@ -141,30 +139,6 @@ def test_the_largest_cause_of_each_joint_is_named():
     causes[STICTION][0] = 0.0
     both = limits_remark("gmo", causes, np.array([True, True]))
     assert both.values["causes"] == ["friction", STICTION]
-
-
-@pytest.mark.parametrize(
-    ("error", "code"), [(3.0, "paper-gains-measured"), (0.7, "paper-gains-measured-level")]
-)
-def test_the_cost_of_the_papers_gains_is_measured_beside_the_best(error, code):
-    sizes = (("best", 1.0), ("gmo", error))
-    rows = [(name, j, j * size - 0.5 * size) for name, size in sizes for j in (1, 2)]
-    rows.append(("gmo", 3, None))
-    errors = pl.DataFrame(rows, schema=["observer", "joint", "rmse_Nm"], orient="row")
-    unknown = dict.fromkeys(("l1_Nm", "reference_rms_Nm", "reference_floor_Nm"), pl.lit(None))
-    errors = errors.with_columns(reference_trusted=pl.lit(True), **unknown)
-    tunings = {"gmo": MomentumObserver(gain=np.array([10.0, 5.0])).tuning(0.002, 2)}
-    (gap,) = paper_gap(errors, tunings)
-    assert gap.code == code
-    assert str(gap)
-    delays = {"least_delay_ms": pytest.approx(100.0), "most_delay_ms": pytest.approx(200.0)}
-    ratio = pytest.approx(error)
-    assert gap.values == {"ratio": ratio, "ratios": {"gmo": ratio}} | delays
-    # Without the best there is nothing to measure against, nor beside one without an error.
-    assert paper_gap(errors.filter(pl.col("observer") == "gmo"), tunings) == ()
-    assert paper_gap(errors.filter(pl.col("observer") == "best"), tunings) == ()
-    none = pl.when(pl.col("observer") == "best").then(0.0).otherwise(pl.col("rmse_Nm"))
-    assert paper_gap(errors.with_columns(rmse_Nm=none), tunings) == ()
 
 
 LOG = read(Path(__file__).parents[2] / "fixtures" / "ur5_circle.csv")

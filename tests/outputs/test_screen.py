@@ -34,7 +34,7 @@ from vftcli.outputs.screen import (
     written_lines,
 )
 from vftcli.signals.arrays import Array
-from vftcli.signals.remarks import fact, warning
+from vftcli.signals.remarks import warning
 
 CANVAS = Canvas(width=80)
 
@@ -110,7 +110,7 @@ def test_a_joint_whose_reference_rests_counts_in_no_mean(analysis: Analysis) -> 
     (left,) = blocks(rests)
     text = against(left, analysis)
     assert text.startswith("Against vendor without J1 (own error 0.20 N·m): RMSE ")
-    paper = replace(analysis, remarks=(fact("paper-gains-measured"),))
+    paper = replace(analysis, of_robot_file=True)
     assert "the paper's gains" in against(left, paper)
     assert left.means.errors["best"] == pytest.approx(block.rmse[0, 1:].mean())
     (every,) = blocks(analysis.errors.with_columns(reference_trusted=pl.lit(value=False)))

@@ -1,6 +1,6 @@
 """Reference torques and wrenches by source, and estimates beside them: a table of errors."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
@@ -14,14 +14,12 @@ from vftcli.evaluation.errors import (
     Schema,
     correlation,
     evaluate,
-    joint_means,
     rmse,
     tidy,
 )
 from vftcli.free_motion.free_motion import FreeMotion, within
 from vftcli.free_motion.two_cycle import two_cycle_reference
-from vftcli.observers.observer import Tuning
-from vftcli.observers.table import BEST, PAPER
+from vftcli.observers.table import BEST
 from vftcli.readers.reader import RawLog
 from vftcli.readers.references import JacobianLog, read_reference
 from vftcli.robots.chain import flange_jacobian, link_poses
@@ -202,9 +200,6 @@ def unloaded(log: JacobianLog, values: Array, zero: ZeroChoice) -> Array:
     return np.asarray(values - values[inside].mean(axis=0))
 
 
-AHEAD = 1.05  #: Least ratio of the paper's error to the best's in a remark.
-
-
 class ReferenceLoad(NamedTuple):
     """Reference torque and wrench on the log's clock."""
 
@@ -316,25 +311,6 @@ def on_the_logs_clock(t: Array, columns: Array, recording: Recording, path: Path
         )
     there = resample_columns(recording.t, t, columns)
     return np.where(inside[:, None], there, np.nan)
-
-
-def paper_gap(errors: pl.DataFrame, tunings: Mapping[str, Tuning]) -> tuple[Remark, ...]:
-    """The measured cost of the paper's gains, none unless they and `best` ran."""
-    means = joint_means(errors).errors
-    least, paper = means.get(BEST, 0.0), [name for name in PAPER if name in means]
-    ratios = {name: means[name] / least for name in paper if least > 0.0}
-    ratio = np.mean([*ratios.values()]) if ratios else np.nan
-    if not np.isfinite(ratio):
-        return ()
-    delays = np.concatenate([tunings[name].delay for name in paper])
-    said = fact(
-        "paper-gains-measured" if ratio >= AHEAD else "paper-gains-measured-level",
-        ratio=ratio,
-        ratios=ratios,
-        least_delay_ms=1e3 * delays.min(),
-        most_delay_ms=1e3 * delays.max(),
-    )
-    return (said,)
 
 
 def judge(

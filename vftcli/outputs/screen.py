@@ -10,6 +10,7 @@ import numpy as np
 from vftcli.analysis import Analysis
 from vftcli.contacts.contact_list import Contact, ContactList
 from vftcli.doctor.examination import doubt
+from vftcli.observers.table import BEST, PAPER
 from vftcli.outputs import Record
 from vftcli.outputs.believability import (
     LOG_COLUMNS,
@@ -46,8 +47,6 @@ FORMS = ((None, None), (3, 20), (2, 20), (1, 20), *((0, rows) for rows in range(
 
 MOST_LOGS, WORST = 20, 3  #: Most logs shown, and findings below them.
 SUBJECT = 17  #: Columns of a ground's subject.
-#: Codes of remarks that others run on the paper's gains.
-MEASURED = ("paper-gains-measured", "paper-gains-measured-level")
 
 NARROWEST, WIDEST = 40, 100  #: Least and most columns of a screen.
 ROWS = 3  #: Lines of the bars.
@@ -239,10 +238,10 @@ def against(block: "Block", analysis: Analysis) -> str:
     text = f"Against {printable(block.reference)}{means.left_out}{floor}: "
     text += f"RMSE {significant(least, 2)} N·m ({name})"
     if others:
-        paper = any(remark.code in MEASURED for remark in analysis.remarks)
+        paper = name == BEST and any(other in PAPER for other, _ in others)
         sizes = sorted(value for _, value in others)
         ends = dict.fromkeys(significant(sizes[k], 2) for k in (0, -1))
-        group = "the paper's gains" if paper else "the others"
+        group = "the paper's gains" if paper and analysis.of_robot_file else "the others"
         text += f"; {group} {'–'.join(ends)} N·m"
     return f"{text} → --details"
 
