@@ -19,7 +19,6 @@ from vftcli.identification.training import apparent_load, prepare
 from vftcli.robots import JointFriction, Payload, load_robot
 from vftcli.robots.friction import friction_torque
 from vftcli.robots.kernels import chain_parameters, torque_regressor
-from vftcli.robots.profile import robot_toml
 from vftcli.robots.terms import gravity_torque
 from vftcli.signals import errors
 from vftcli.signals.arrays import root_mean_squares
@@ -305,13 +304,9 @@ def test_a_pair_of_one_file_name_is_a_pair():
     assert (source["id"], source["ref"]) == ("log-2", "log.csv, 3750 samples, 29.992 s")
 
 
-def test_what_a_paper_printed_of_the_profile_is_not_said_of_another_arm():
+def test_an_identified_arm_has_no_file_and_says_so_in_its_title():
     robot = identify([log(UR5.with_payload(HAND), 1)], UR5, Task(method="payload")).robot
-    assert UR5.published
-    assert "published" in UR5.document
-    assert robot.published == {}
     assert (robot.path, robot.title) == (None, f"{UR5.title}, identified")
-    assert "[published]" not in robot_toml(robot)
 
 
 def test_the_heavier_log_is_refused_as_the_free_one_whatever_its_name():

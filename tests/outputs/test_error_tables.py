@@ -205,18 +205,6 @@ def test_a_pose_that_hides_every_wrench_is_said_in_one_line(wrench_errors: pl.Da
     assert list(error_tables.nothing_to_compare(wrench_errors)) == []
 
 
-def test_the_paper_s_bounds_stand_below_its_own_arm_only(wrench_errors, without_reference, as_if):
-    """They stood below every arm's numbers, a Panda's too."""
-    ur5, panda = (as_if(without_reference, arm=name) for name in ("ur5", "panda"))
-    own = wrench_errors.with_columns(recording=pl.lit(ur5.recording.name))
-    (shown,) = error_tables.axis_grids(own, [ur5])
-    assert shown.rows[-1] == ("paper, UR5", "< 6", "< 6", "< 6", "< 0.65", "< 0.65", "< 0.65")
-    truth = own.with_columns(reference=pl.lit("file:truth"))
-    for rows, arm in ((own, panda), (wrench_errors, ur5), (truth, ur5)):
-        (without,) = error_tables.axis_grids(rows, [arm])
-        assert len(without.rows) == 1
-
-
 def test_contacts_are_counted_in_whole_numbers(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("COLUMNS", "200")
     counts = {"contacts": 3, "listed": 4, "found": 3, "missed": 0}

@@ -57,7 +57,7 @@ def print_errors(
     from vftcli.outputs.screen import MOST_LINES
 
     if form == "terminal":
-        text = to_terminal(rows, analyses, every=details)
+        text = to_terminal(rows, every=details)
         judging = [(a, a.reference) for a in analyses if a.reference is not None]
         if not details:
             pooled = rows.filter(recording=POOLED)
@@ -76,7 +76,7 @@ def print_errors(
         ]
         say_json([*(a.recording for a in analyses), *about], every, rows=rows.to_dicts())
     else:
-        echo_data(FORMS[form](rows, analyses))
+        echo_data(FORMS[form](rows))
 
 
 @opt.command(ReferenceChoice, *opt.OF_ANALYSIS, opt.TableForm)

@@ -118,7 +118,7 @@ def show_answers(
     for made in analyses:
         say_analysis(made)
         if details and made.errors is not None:
-            show(to_terminal(made.errors, [made]))
+            show(to_terminal(made.errors))
         if details and made.published is not None:
             remarks = (f"- {remark}\n" for remark in made.published.remarks)
             show(terminal(print_grid(made.published)) + "".join(remarks))

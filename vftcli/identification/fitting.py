@@ -228,11 +228,8 @@ def with_provenance(
         name=name or f"{profile.name}-identified",
         title=f"{profile.title or profile.name}, identified",
         path=None,
-        published={},
     )
     document = robot_document(named)
-    # The profile's published numbers are of the paper's arm.
-    document.pop("published", None)
     new = f"identified ({found.method}) from {names_of(trained)}"
     old = f"profile {profile.name}"
     sure = found.parameters.filter("determined").select("joint", "parameter")

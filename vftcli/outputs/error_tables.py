@@ -1,6 +1,6 @@
 """Errors of torques [N·m] and wrenches [N, N·m] as tables, an observer a row."""
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from itertools import groupby, starmap
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -230,9 +230,8 @@ def marks_in_words(found: Sequence[Block]) -> list[str]:
     return lines
 
 
-def axis_grids(errors: pl.DataFrame, analyses: "Iterable[Analysis]" = ()) -> Iterator[Grid]:
-    """RMSE of the wrenches, a table a log; the paper's bounds below."""
-    published = {a.recording.name: a.robot.published for a in analyses}
+def axis_grids(errors: pl.DataFrame) -> Iterator[Grid]:
+    """RMSE of the wrenches, a table a log."""
     for group in logs_of(errors, "axis"):
         samples = compared_samples(group)
         if not samples:
@@ -241,10 +240,6 @@ def axis_grids(errors: pl.DataFrame, analyses: "Iterable[Analysis]" = ()) -> Ite
         values = group.select("observer", "axis", rmse=pl.coalesce("rmse_N", "rmse_Nm"))
         wide = values.pivot("axis", index="observer", values="rmse")
         rows: Rows = list(wide.select("observer", *AXES).rows())
-        # The paper's bounds are those of a sensor.
-        if reference == "sensor" and (limits := published.get(recording)):
-            force, moment = limits["wrench_rmse_N"], limits["wrench_rmse_Nm"]
-            rows.append(("paper, UR5", *[f"< {force:g}"] * 3, *[f"< {moment:g}"] * 3))
         axes = (Column(a, unit_of(a), symbol=f"${a[0].upper()}_{a[1]}$") for a in AXES)
         title = f"{recording} against {reference}, wrench, {samples} unmasked samples"
         yield Grid(("observer", *axes), rows, title, quantity="RMSE", swatches=True)
@@ -288,9 +283,7 @@ def doubts_of(errors: pl.DataFrame) -> list[str]:
     return [doubt(f"{name}: {codes}") for name, codes in rows.iter_rows() if name != POOLED]
 
 
-def to_terminal(
-    errors: pl.DataFrame, analyses: "Sequence[Analysis]" = (), *, every: bool = True
-) -> str:
+def to_terminal(errors: pl.DataFrame, *, every: bool = True) -> str:
     """The tables of the errors as text, with their marks' meaning."""
     found = blocks(errors)
     if not found:
@@ -301,35 +294,35 @@ def to_terminal(
     )
     joints = "\n".join(terminal(rmse_grid(table)) for table in found)
     details = detail_grids(errors) if every else ()
-    grids = (*details, *axis_grids(errors, analyses), *contact_grids(errors))
+    grids = (*details, *axis_grids(errors), *contact_grids(errors))
     return above + "\n".join([joints + marks + below, *map(terminal, grids)])
 
 
-def to_markdown(errors: pl.DataFrame, analyses: "Sequence[Analysis]" = ()) -> str:
+def to_markdown(errors: pl.DataFrame) -> str:
     """All tables of the errors as GitHub Markdown."""
     found = blocks(errors)
     doubts = (f"> **{escape_markdown(line)}**\n" for line in doubts_of(errors))
     marks = map(escape_markdown, [*marks_in_words(found), *nothing_to_compare(errors)])
     tables = map(markdown, map(rmse_grid, found))
-    below = map(markdown, [*detail_grids(errors), *axis_grids(errors, analyses)])
+    below = map(markdown, [*detail_grids(errors), *axis_grids(errors)])
     return "\n".join([*doubts, *tables, *(f"{line}\n" for line in marks), *below])
 
 
-def to_latex(errors: pl.DataFrame, analyses: "Sequence[Analysis]" = ()) -> str:
+def to_latex(errors: pl.DataFrame) -> str:
     """The RMSE as LaTeX tables; equal joint heads share one."""
     lines = [*doubts_of(errors), *nothing_to_compare(errors)]
     doubts = "".join(f"% {printable(line)}\n" for line in lines)
     alike = groupby(blocks(errors), key=lambda table: table.joint_heads)
     found = [list(map(rmse_grid, tables)) for _, tables in alike]
-    if axes := list(axis_grids(errors, analyses)):
+    if axes := list(axis_grids(errors)):
         found.append(axes)
     return doubts + "\n".join(starmap(latex, found))
 
 
 #: Name of a form → the text of the errors table in it.
 FORMS = {
-    "csv": lambda errors, _analyses=(): csv_rows(errors.to_dicts(), errors.columns),
-    "json": lambda errors, _analyses=(): to_json(errors.to_dicts()),
+    "csv": lambda errors: csv_rows(errors.to_dicts(), errors.columns),
+    "json": lambda errors: to_json(errors.to_dicts()),
     "markdown": to_markdown,
     "latex": to_latex,
 }

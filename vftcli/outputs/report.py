@@ -137,5 +137,5 @@ def put_errors(
     errors = pl.concat(found, how="diagonal")
     marked = tables.marked(errors, analyses)
     for name, text_of in zip(ERROR_TABLES, tables.FORMS.values(), strict=True):
-        folder.write(f"{place}{name}", text_of(marked, analyses))
+        folder.write(f"{place}{name}", text_of(marked))
     return errors

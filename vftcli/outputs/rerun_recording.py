@@ -66,7 +66,7 @@ def write_rrd(path: Path, analysis: Analysis, detail: str = LEVELS) -> None:
     robot, found = analysis.robot, analysis.contacts
     tabs = tabs_of(analysis, detail)
     words, arrow, painted = {"Summary": summary(analysis)}, None, {}
-    if analysis.errors is not None and (table := to_markdown(analysis.errors, [analysis])):
+    if analysis.errors is not None and (table := to_markdown(analysis.errors)):
         words["Errors"] = table
     if found is not None:
         tabs[0] = tabs[0]._replace(log=contact_log(found))

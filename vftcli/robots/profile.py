@@ -121,7 +121,6 @@ def assemble(root: Section, joints: Sequence[Section], chain: Chain) -> Robot:
         sensors=poses(root.section("sensor")),
         admittance=checked_admittance(root.section("admittance")),
         sources=root.tables("sources"),
-        published=root.section("published").values,
         document=root.values,
         remarks=(
             *(fact("robot-file-note", text=text) for text in notes if text),

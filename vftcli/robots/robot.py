@@ -140,8 +140,6 @@ class Robot(Shown):
     admittance: Mapping[str, Any] = field(default_factory=dict)
     #: Where numbers come from: id, what and ref, in words.
     sources: tuple[Mapping[str, Any], ...] = ()
-    #: A publication's numbers of this arm for the tables.
-    published: Mapping[str, Any] = field(default_factory=dict)
     #: The whole parsed robot file, for writing a changed one.
     document: Mapping[str, Any] = field(default_factory=dict)
     remarks: tuple[Remark, ...] = ()  #: What a user should know.

@@ -159,7 +159,7 @@ def errors_view(analysis: Analysis) -> Record:
     return {
         "state": state,
         "first": list(map(rmse_grid, found)),
-        "axes": axis_grids(table, [analysis]),
+        "axes": axis_grids(table),
         "missing": nothing_to_compare(table),
     }
 
