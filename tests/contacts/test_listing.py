@@ -240,6 +240,26 @@ def test_another_arm_that_nobody_touches_lists_nothing(logs, name, start):
     assert not list_contacts(motion(recording, "ur3")).contacts
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("seconds", [10.0, 30.0])
+def test_a_rest_behind_the_motion_changes_no_list(logs, seconds):
+    """A gripper of .95 kg that nobody stated; six contacts of 42 N behind a rest of 10 s."""
+    log = read(logs / "ur3" / "repeat_b.bag", columns="-tau")
+    count, rng = round(seconds * 125), np.random.default_rng(5)
+    still = np.repeat(log.torque[-1:], count, axis=0)
+    rested = replace(
+        log,
+        t=np.concatenate([log.t, log.t[-1] + (1 + np.arange(count)) / 125]),
+        q=np.concatenate([log.q, np.repeat(log.q[-1:], count, axis=0)]),
+        dq=np.concatenate([log.dq, rng.normal(0.0, 2e-4, still.shape)]),
+        torque=np.concatenate([log.torque, still + rng.normal(0.0, 0.1, still.shape)]),
+    )
+    found = list_contacts(motion(rested, "ur3"))
+    assert not found.contacts
+    # The motion itself weighs .93 kg, ± .17 at 95 %.
+    assert found.load.mass == pytest.approx(0.93, abs=0.17)
+
+
 def test_without_friction_and_free_motion_no_contact_is_listed():
     """Inverse dynamics by Pinocchio, friction of 8 N·m that the model lacks, nobody touches."""
     _, log = moving_arm(6, friction=8.0)

@@ -15,6 +15,7 @@ from the others, at several degrees of freedom; samples in motion judge a joint.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -115,6 +116,18 @@ class Rows:
     def joints(self) -> int:
         """Number of joints n."""
         return len(self.columns)
+
+    @cached_property
+    def share(self) -> Array:
+        """Weight of each sample: all rest counts at most as the motion. (S, 1)"""
+        moving = int(np.count_nonzero(self.moves))
+        weight = max(moving, FEWEST) / max(len(self.moves) - moving, 1)
+        return np.where(self.moves, 1.0, min(weight, 1.0))[:, None]
+
+    def moving(self, free: Mask) -> Mask:
+        """The free samples in motion, all free ones if too few move. (S,)"""
+        inside = free & self.moves
+        return inside if np.count_nonzero(inside) >= FEWEST else free
 
     @property
     def unknowns(self) -> int:
@@ -239,10 +252,9 @@ def fit_robustly(rows: Rows, step: float, dry: Array) -> WholeLogFit:
     residual, scale = first_fit(rows, step, counted, least)
     for _ in range(FREE_PASSES):
         free = free_samples(np.max(abs(residual) / scale, axis=1), step)
-        weight = huber(residual / scale) / (counted * scale**2)
+        weight = rows.share * huber(residual / scale) / (counted * scale**2)
         residual = rows.residual(rows.solution(rows.sums(weight, free)[0]))
-        used = free & rows.moves
-        scale = np.maximum(robust_sd(residual[used if used.any() else free]), least)
+        scale = np.maximum(robust_sd(residual[rows.moving(free)]), least)
     return WholeLogFit(rows=rows, step=step, free=free, scale=scale, weight=weight)
 
 
@@ -250,7 +262,7 @@ def first_fit(rows: Rows, step: float, counted: float, least: Array) -> tuple[Ar
     """Residual (S, n) without loads, and its scale, at `least` (n,). [N·m]"""
     held = SlowLoads(rows.loads.torque[:, :, :0], 0 * rows.loads.knot, rows.loads.share, 1)
     rows, residual = replace(rows, loads=held), rows.d
-    moves = rows.moves if np.count_nonzero(rows.moves) >= FEWEST else slice(None)
+    moves = rows.moving(np.ones(len(rows.d), bool))
     quiet = np.quantile(abs(residual[moves]), QUIET_SHARE, axis=0)
     scale = np.maximum(SD_PER_MEDIAN * quiet / QUIET_QUANTILE, least)
     threshold, reach = np.inf, round(REACH / step)
@@ -263,7 +275,7 @@ def first_fit(rows: Rows, step: float, counted: float, least: Array) -> tuple[Ar
         threshold = max(threshold, NARROWEST)
         share = (1.0 + (worst / threshold) ** 2) ** -2
         residual = rows.residual(
-            rows.solution(rows.sums(share[:, None] / (counted * scale**2))[0])
+            rows.solution(rows.sums(rows.share * share[:, None] / (counted * scale**2))[0])
         )
         trusted = residual[moves][share[moves] > TRUSTED]
         if len(trusted):
@@ -302,15 +314,15 @@ class Guarded(NamedTuple):
 
 def guarded(fit: WholeLogFit, dq: Array) -> Guarded:
     """A fit tested on folds of its free samples; dq is (S, n). [rad/s]"""
-    moves = faster(dq)
-    judged = moves | (moves[fit.free].mean(axis=0) < SELDOM)
-    folds = [(int(f[0]), int(f[-1]) + 1) for f in np.array_split(np.flatnonzero(fit.free), FOLDS)]
+    moves, used = faster(dq), fit.rows.moving(fit.free)
+    judged = moves | (moves[used].mean(axis=0) < SELDOM)
+    folds = [(int(f[0]), int(f[-1]) + 1) for f in np.array_split(np.flatnonzero(used), FOLDS)]
     left_out = [covered([f], len(fit.free), margin=round(MARGIN / fit.step)) for f in folds]
     whole, *parts = fit.rows.sums(fit.weight, fit.free, left_out)
     squares = np.zeros((len(SCALES), fit.rows.joints))
     for fold, part in zip(folds, parts, strict=True):
         inner = slice(*fold)
-        free = fit.free[inner]
+        free = used[inner]
         rest = whole.minus(part)
         for k, scale in enumerate(SCALES):
             residual = fit.rows.d[inner]

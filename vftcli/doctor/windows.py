@@ -29,6 +29,8 @@ from vftcli.signals.estimation import inverse_of
 from vftcli.signals.recording import Recording
 
 WINDOW, WINDOWS = 0.3, 200  #: Length of a window [s], and most windows.
+#: Way of a joint that moves in a window [rad]; least most windows without motion.
+WAY, REST_WINDOWS = 5e-3, 20
 #: Instants of the model in a window: 50 ms apart they miss nothing.
 POINTS = 7
 #: Those of them with gravity, which bends little between them.
@@ -198,6 +200,11 @@ def windows_of(recording: Recording, robot: Robot, ignored: Sequence[int] = ()) 
     t, dq = recording.t, recording.require("dq")
     length = max(1, min(round(WINDOW / recording.median_step), (recording.samples - 1) // 3))
     first = np.arange(0, recording.samples - length, max(1, length // 2))
+    way = abs(recording.q[first + length] - recording.q[first]).max(axis=1)
+    moving, still = (first[some] for some in (way > WAY, way <= WAY))
+    if len(moving):  # of rest, one pose and its stiction, no more than of motion
+        still = still[spread(len(still), max(len(moving), REST_WINDOWS))]
+    first = np.sort(np.concatenate([moving, still]))
     first = first[spread(len(first), WINDOWS)]
     samples = first[:, None] + np.arange(length + 1)
     few, speed = samples[:, np.linspace(0, length, POINTS).round().astype(int)], dq[samples]
