@@ -244,14 +244,14 @@ def test_a_file_fits_a_few_screens() -> None:
 
 
 MOST = {
-    "lines of Python": 49_580,
-    "files": 205,
-    "functions": 2625,
-    "functions over 60 lines": 7,
-    "names, operators, numbers": 362_320,
-    "characters a line that is not blank": 50.03,
-    "noqa": 69,
-    "lines of TOML, JavaScript, CSS": 7258,
+    "lines of Python": 48_781,
+    "files": 204,
+    "functions": 2593,
+    "functions over 60 lines": 6,
+    "names, operators, numbers": 355_931,
+    "characters a line that is not blank": 50.01,
+    "noqa": 67,
+    "lines of TOML, JavaScript, CSS": 7209,
 }
 """The size of the package: whoever makes it smaller lowers these, nobody raises them."""
 
