@@ -393,8 +393,6 @@ WITHOUT_ROW = {
         "free-part-not-quiet", "gains-without-free-part"),
     "keeps the profile's links where the user wants them": ("links-identified",),
     "asks for a description of the user's own arm": ("no-robot-fits", "no-robot-fits-any"),
-    "about Table I; tried in tests/evaluation/test_published.py": (
-        "print-kalman-density", "print-noise-floor"),
     "tried in tests/robots/test_urdf.py": ("simulator-friction-left",),
     "needs a data set with a wrench of unknown origin": ("wrench-left-out",),
 }  # fmt: skip

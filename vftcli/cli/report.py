@@ -67,7 +67,7 @@ def report(
     for made in analyse_logs(logs, choice, left_out.add):
         analyses.append(made)
         if published is not None and made.errors is not None:
-            table = compare_with(published, made.errors, made.observers, made.tunings)
+            table = compare_with(published, made.errors)
             analyses[-1] = replace(made, published=table)
     if not analyses:
         left_out.end(0)
@@ -120,8 +120,7 @@ def show_answers(
         if details and made.errors is not None:
             show(to_terminal(made.errors))
         if details and made.published is not None:
-            remarks = (f"- {remark}\n" for remark in made.published.remarks)
-            show(terminal(print_grid(made.published)) + "".join(remarks))
+            show(terminal(print_grid(made.published)))
 
 
 @opt.command(*opt.OF_ANALYSIS, OutputChoice)

@@ -1,19 +1,14 @@
 """The paper's printed error table beside a log's errors."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
 import polars as pl
 
-from vftcli.observers.observer import Observer, Tuning
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.parsing import check_known
-from vftcli.signals.remarks import Remark, fact, on_joints
-
-#: Errors within this share are one filter's, computed in two ways.
-SAME_FILTER = 1e-6
 
 
 class Published(NamedTuple):
@@ -46,8 +41,6 @@ class Comparison(NamedTuple):
     #: Observer → computed RMSE of each joint, NaN if unknown. (n,) [N·m]
     ours: Mapping[str, Array]
     floor: Array  #: The reference's own error. (n,) [N·m]
-    observers: Mapping[str, Observer]  #: The observers that ran, by name.
-    tunings: Mapping[str, Tuning]  #: Meaning of their gains at the log's sample time.
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -57,50 +50,6 @@ class Comparison(NamedTuple):
     def printed(self, name: str) -> Array:
         """Printed RMSE of an observer. (n,) [N·m]"""
         return np.array(self.published.rmse[name])
-
-    @property
-    def remarks(self) -> Iterator[Remark]:
-        """Differences of the two, and reasons for them."""
-        if self.names:
-            yield from self.sizes()
-        # FDO and GMO of equal gain are one filter: they agree on these joints.
-        if {"fdo", "gmo"} <= {*self.names}:
-            gap = abs(self.ours["fdo"] - self.ours["gmo"])
-            if (alike := gap <= SAME_FILTER * self.ours["fdo"]).any():
-                printed = abs(self.printed("fdo") - self.printed("gmo"))[alike]
-                yield fact("print-one-filter", on_joints(alike), printed_Nm=float(printed.max()))
-        # The noise convention decides the Kalman bandwidth, and the ranking.
-        if "kfo-fe" in self.names and "kfo-fe" in self.tunings:
-            convention = getattr(self.observers.get("kfo-fe"), "noise_convention", "density")
-            code = "print-kalman-discrete" if convention == "discrete" else "print-kalman-density"
-            delay = 1e3 * float(self.tunings["kfo-fe"].delay[0])
-            yield fact(code, convention=convention, delay_ms=delay)
-        last = [row[5] for row in self.published.rmse.values()]
-        floor = float(self.floor[5])
-        yield fact("print-noise-floor", least_Nm=min(last), most_Nm=max(last), floor_Nm=floor)
-
-    def sizes(self) -> Iterator[Remark]:
-        """Joints with another best observer than in print, and ratios to the print."""
-        printed = np.array([self.printed(name) for name in self.names])
-        ours = np.array([self.ours[name] for name in self.names])
-        # The first is named for a joint without a known observer.
-        here = np.where(np.isfinite(ours), ours, np.inf).argmin(axis=0)
-        pairs = zip(printed.argmin(axis=0), here, strict=True)
-        other = [
-            f"J{j} ({self.names[theirs]} in print, {self.names[own]} here)"
-            for j, (theirs, own) in enumerate(pairs, start=1)
-            if theirs != own
-        ]
-        joints, ratio = len(here), ours / printed
-        if other:
-            same = joints - len(other)
-            yield fact("print-other-best", same=same, joints=joints, differing=other)
-        else:
-            yield fact("print-same-best", joints=joints)
-        median, least, most = (
-            float(size(ratio)) for size in (np.nanmedian, np.nanmin, np.nanmax)
-        )
-        yield fact("print-sizes", median=median, least=least, most=most)
 
 
 def check_published(name: str, reference: str | None) -> None:
@@ -112,12 +61,7 @@ def check_published(name: str, reference: str | None) -> None:
         )
 
 
-def compare_with(
-    name: str,
-    errors: pl.DataFrame,
-    observers: Sequence[Observer],
-    tunings: Mapping[str, Tuning],
-) -> Comparison:
+def compare_with(name: str, errors: pl.DataFrame) -> Comparison:
     """A printed table beside computed errors."""
     published = TABLES[name]
     rows = errors.filter(pl.col("joint").is_not_null())
@@ -134,11 +78,4 @@ def compare_with(
         ours[str(observer)] = np.full(joints, np.nan)
         ours[str(observer)][at] = own["rmse_Nm"].to_numpy()
         floor[at] = own["reference_floor_Nm"].to_numpy()
-    return Comparison(
-        published=published,
-        recording=str(rows["recording"][0]),
-        ours=ours,
-        floor=floor,
-        observers={observer.name: observer for observer in observers},
-        tunings=tunings,
-    )
+    return Comparison(published, str(rows["recording"][0]), ours, floor)

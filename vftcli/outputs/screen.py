@@ -30,7 +30,6 @@ from vftcli.outputs.grid import DASH, GridCell, keyed_grid, percent, significant
 from vftcli.outputs.grids import contact_grids
 from vftcli.signals.arrays import Array
 from vftcli.signals.parsing import printable
-from vftcli.signals.remarks import sentence
 
 if TYPE_CHECKING:
     from vftcli.outputs.error_tables import Block
@@ -114,8 +113,7 @@ def log_screen(
     for grid in contact_grids(analysis.errors):
         tail += terminal(grid).splitlines()
     if (printed := analysis.published) is not None:
-        why = next((f": {sentence(each)}" for each in printed.remarks), "")
-        tail += canvas.wrapped(f"Beside {printed.published.title}{why} → --details", 2)
+        tail += canvas.wrapped(f"Beside {printed.published.title} → --details", 2)
     for each, rows in FORMS[:1] if every else FORMS[1:]:
         table = [] if listed is None else list_lines(listed, rows, canvas)
         believed = belief_lines(found, canvas, each)
