@@ -737,7 +737,7 @@ WITHOUT_ROW = {
         "samples are not finite; leave them out with --interval",
         "a free run must be of the same arm"),
     "its remark, or its command, is tried": (
-        "no free part to learn the band", "no [observers.*] tables"),
+        "no [observers.*] tables",),
     "tried in tests/cli/test_benchmark.py and tests/reproduction/test_manifest.py": (
         "--data …: there is no such folder", "--outside …: …", "is looked for, LOG one of"),
     "no log that provokes it is known": (

@@ -29,8 +29,8 @@ from vftcli.signals.estimation import inverse_of
 from vftcli.signals.recording import Recording
 
 WINDOW, WINDOWS = 0.3, 200  #: Length of a window [s], and most windows.
-#: Way of a joint that moves in a window [rad]; least most windows without motion.
-WAY, REST_WINDOWS = 5e-3, 20
+#: Way of a joint that moves in a window [rad]; rest may fill so many windows.
+WAY, REST_WINDOWS = 5e-3, 120
 #: Instants of the model in a window: 50 ms apart they miss nothing.
 POINTS = 7
 #: Those of them with gravity, which bends little between them.
