@@ -384,6 +384,8 @@ ROWS = [
     Row("two columns could be", converted(with_columns(q_1=pl.col("q1"))), "--columns", PLAIN),
     Row("could both be", converted(with_columns(pl.col("^dq.$").name.replace("dq", "qd"))),
         "--columns", PLAIN),
+    Row("have several units", converted(renamed({"q3": "q3 [rad]"})), "--columns",
+        PLAIN.replace("q=q{i}", "q=q1|q2|q3 [rad]|q4|q5|q6", 1)),
     Row("with holes. Name them", converted(renamed({"q3": "q9"})), "--columns",
         PLAIN.replace("q=q{i}", "q=q1|q2|q9|q4|q5|q6", 1)),
     Row("holds no number in its first row", converted(

@@ -33,6 +33,9 @@ SILENT: Mapping[tuple[str, str], str] = {
 }
 """Harmful pairs that nothing in the log can tell from a sound one, with the reason."""
 
+ECHOES = {("panda", "saturated_J2"): ["effort-offset"]}
+"""Other warnings beside the right one: clipped on one side, an effort's mean is moved."""
+
 OF_ROWS = {"dropped_5%", "dropped_1s", "duplicate_rows_10%", "stale_rows_10%", "quantised_1mrad"}
 HARMLESS = {
     "ur10e": OF_ROWS,
@@ -96,7 +99,7 @@ def test_a_fault_is_named_by_no_other_name_and_refused_where_results_mean_nothin
     new = [finding for finding in findings if kind(finding) not in kinds_of(log)]
     warnings = [finding for finding in new if finding.level == "warning"]
     wrong = [finding.code for finding in warnings if not fault.is_named_by(finding)]
-    assert wrong == []
+    assert wrong == ECHOES.get((log, name), [])
     if name in HARMLESS[log]:
         return
     named = any(fault.is_named_by(finding) for finding in new)
