@@ -244,14 +244,14 @@ def test_a_file_fits_a_few_screens() -> None:
 
 
 MOST = {
-    "lines of Python": 48_781,
+    "lines of Python": 48_715,
     "files": 204,
-    "functions": 2593,
+    "functions": 2591,
     "functions over 60 lines": 6,
-    "names, operators, numbers": 355_931,
+    "names, operators, numbers": 355_350,
     "characters a line that is not blank": 50.01,
     "noqa": 67,
-    "lines of TOML, JavaScript, CSS": 7209,
+    "lines of TOML, JavaScript, CSS": 7184,
 }
 """The size of the package: whoever makes it smaller lowers these, nobody raises them."""
 
